@@ -1,0 +1,7 @@
+//! What the instrument is (frames of reference, image planes, camera, light, rig) and how each part of it is estimated
+//! from observations. Pure functions: no I/O, clock, thread or log.
+//!
+//! [`description`] holds plain data and conventions only; it is all that the simulator may use (a house rule checks
+//! it). Everything that *computes* with a description (projection, distortion, emission) lives beside it.
+
+pub mod description;

@@ -1,0 +1,18 @@
+//! Weavelight: a camera, ten LEDs and an Arduino as a fabric scanner.
+//!
+//! A capture session (RAW frames, one LED each) and a calibration go in; per photosite the surface normal and the albedo
+//! come out. Folders are the architecture:
+//!
+//! - [`files`]: reading and writing that every format shares (TOML with places, hashes, whole-or-nothing outputs)
+//! - [`raster`]: float and integer pictures (EXR, PNG, TIFF, JPEG) in and out
+//! - [`raw`]: a frame as the sensor wrote it
+//! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
+//!   [`solution`]: the folder that a solve writes
+//! - [`photometry`]: the kernels, on one band of rows; [`solve`]: the run around them
+//! - [`simulate`]: the simulated rig's folders
+//! - [`report`]: what a command tells
+
+pub mod instrument;
+pub mod photometry;
+pub mod raw;
+pub mod session;

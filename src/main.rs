@@ -1,0 +1,3 @@
+//! The `weavelight` command.
+
+fn main() {}

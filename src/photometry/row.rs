@@ -1,0 +1,76 @@
+/// One row of photosites, as every kernel reads it.
+///
+/// Symbols: y_i = rho (l_i . n) + noise, with l_i the light vector of light i (unit direction times falloff, rig frame, in
+/// units of the light's own intensity), n the unit normal and rho the albedo under this photosite's colour filter.
+pub struct RowInput<'a> {
+    /// Per light: y, one value a photosite. Linear signal divided by exposure, ISO, the light's intensity in the
+    /// photosite's channel and its gain map, ambient light removed. NaN where the sample cannot be used (saturated,
+    /// dead photosite, not finite in the file, outside the mask).
+    pub signal: &'a [&'a [f32]],
+    /// Light vectors along this row.
+    pub field: FieldRow<'a>,
+    /// Per light: the variance of y at even and at odd columns (the two colour filters of the row).
+    pub variance: &'a [[VarianceModel; 2]],
+    /// Per photosite: what all lights' gain maps together do to the noise (1 / mean gain); `None` means 1 everywhere.
+    /// The shot-noise term scales with it, the floor with its square.
+    pub noise_scale: Option<&'a [f32]>,
+}
+
+/// Light vectors at equally spaced nodes of one row, linear in between. float64 because the pseudo-inverses are
+/// computed here.
+#[derive(Clone, Copy)]
+pub struct FieldRow<'a> {
+    /// Columns between nodes; node k stands at column `k * step`, the last one at or beyond the last column.
+    pub step: usize,
+    /// `nodes * lights` vectors, node-major.
+    pub vectors: &'a [[f64; 3]],
+    /// Lights, 3 to 64.
+    pub lights: usize,
+}
+
+/// var(y) = shot * y + floor + (kappa y)^2, in units of y squared.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct VarianceModel {
+    /// Shot noise per unit of y.
+    pub shot: f32,
+    /// Read noise and quantisation, of the ambient frame too.
+    pub floor: f32,
+    /// What the light model leaves over, relative to the signal.
+    pub kappa: f32,
+}
+
+/// What the solve says of one row. All slices are as long as the row.
+pub struct RowOutput<'a> {
+    /// Unit normals, rig frame; zero where unsolved.
+    pub normal: &'a mut [[f32; 3]],
+    /// Albedo under the photosite's own filter; zero where unsolved.
+    pub albedo: &'a mut [f32],
+    /// Expected RMS of the total angular error of the normal, degrees; zero where unsolved.
+    pub expected_error_deg: &'a mut [f32],
+    /// Root of the residual's mean square over the lights used, in units of y; zero where unsolved.
+    pub residual: &'a mut [f32],
+    /// What became of each photosite.
+    pub outcome: &'a mut [Outcome],
+}
+
+/// What became of a photosite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Outcome {
+    /// Every usable sample kept.
+    Fitted,
+    /// The subset test dropped samples that were too dark for the rest.
+    Shadow,
+    /// The subset test dropped samples that were too bright for the rest.
+    Highlight,
+    /// The subset test dropped samples of both kinds, or kept all although the residual was large.
+    Other,
+    /// Fewer than three usable samples.
+    TooFewLights,
+    /// The usable lights lie in a plane through the photosite.
+    CoplanarLights,
+    /// No light comes back, or the fitted normal points away from the camera.
+    NoSurface,
+    /// Outside the mask.
+    Masked,
+}

@@ -1,0 +1,69 @@
+use weavelight_calibration::description::Cfa;
+
+/// One decoded frame: the decoder's visible area, linear, nothing subtracted, nothing clipped.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Photosites in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// What one pixel holds.
+    pub layout: Layout,
+    /// `width * height * layout.channels()` values, row by row, channels interleaved.
+    pub samples: Samples,
+    /// Black level in raw numbers of the repeating 2 x 2 cell, row-major from the top left (four equal values where the
+    /// frame is no mosaic).
+    pub black: [f32; 4],
+    /// Raw number, black included, from which a sample counts as saturated; per place of the 2 x 2 cell. Infinite where the
+    /// format has no ceiling (EXR).
+    pub saturation: [f32; 4],
+    /// What the file says of the camera; never used by the solve.
+    pub metadata: Metadata,
+}
+
+/// What one pixel of a frame holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// One sample under a colour filter.
+    Mosaic(Cfa),
+    /// One sample, no filter.
+    Grey,
+    /// Three samples R, G, B.
+    Rgb,
+}
+
+impl Layout {
+    /// Samples per pixel.
+    pub fn channels(self) -> usize {
+        match self {
+            Layout::Mosaic(_) | Layout::Grey => 1,
+            Layout::Rgb => 3,
+        }
+    }
+}
+
+/// Sample values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// Integers as the sensor (or the file) has them.
+    U16(Vec<u16>),
+    /// EXR.
+    F32(Vec<f32>),
+}
+
+/// What the file says of the camera, where it says it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Metadata {
+    /// Maker and model, as in "Nikon D5100".
+    pub camera: Option<String>,
+    /// Exposure time in seconds.
+    pub exposure_s: Option<f64>,
+    /// Sensitivity.
+    pub iso: Option<f64>,
+    /// Focal length in millimetres.
+    pub focal_length_mm: Option<f64>,
+    /// Row-major XYZ-to-camera matrix, scaled as usual (1.0 = 1), for illuminant D65 if there are several.
+    pub camera_from_xyz: Option<[[f64; 3]; 3]>,
+    /// Exif orientation; recorded, never applied.
+    pub orientation: Option<u16>,
+}

@@ -1,0 +1,114 @@
+//! The capture session: a folder with `session.toml` and the frames as the camera wrote them. The hub that scanning,
+//! importing and simulating write and everything else reads.
+
+use std::path::PathBuf;
+use weavelight_calibration::description::{Cfa, Plane};
+
+/// A capture session as its `session.toml` describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Session {
+    /// The folder.
+    pub folder: PathBuf,
+    /// What was photographed.
+    pub kind: Kind,
+    /// As in "linen 4021".
+    pub name: String,
+    /// When, if stated.
+    pub captured: Option<jiff::Timestamp>,
+    /// The imaged surface, `None` where the file does not say (then it is the table, unless a board on the sheet gives it).
+    pub plane: Option<Plane>,
+    /// Calibration targets only.
+    pub target: Option<Target>,
+    /// Every frame, in the file's order.
+    pub frames: Vec<FrameEntry>,
+    /// Mask picture, relative to the folder.
+    pub mask: Option<PathBuf>,
+}
+
+/// What a capture session shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A fabric to solve.
+    Swatch,
+    /// A white sheet.
+    White,
+    /// A grey or colour chart.
+    Grey,
+    /// A chessboard.
+    Board,
+}
+
+/// What a calibration target is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Target {
+    /// Reflectance of a white sheet.
+    pub reflectance: Option<f64>,
+    /// Chessboard.
+    pub board: Option<Board>,
+    /// Patches of a chart.
+    pub patches: Vec<Patch>,
+}
+
+/// A chessboard: inner corners and the side of a square.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Board {
+    /// Inner corners in a row.
+    pub columns: usize,
+    /// Inner corners in a column.
+    pub rows: usize,
+    /// Side of a square, millimetres.
+    pub square_mm: f64,
+}
+
+/// One patch of a chart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patch {
+    /// u0, v0, u1, v1 in pixels, both ends inside.
+    pub rect_px: [f64; 4],
+    /// Reflectance, 0..1.
+    pub reflectance: f64,
+    /// CIE Lab under D50, colour charts only.
+    pub lab_d50: Option<[f64; 3]>,
+}
+
+/// One frame of a capture session.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameEntry {
+    /// File name, relative to the folder.
+    pub file: PathBuf,
+    /// Which light was on; `None` for an ambient frame and for pictures of a board.
+    pub light: Option<usize>,
+    /// Exposure time in seconds.
+    pub exposure_s: f64,
+    /// Sensitivity; signals scale with `exposure_s * iso`.
+    pub iso: f64,
+    /// SHA-256 of the file, lower-case hexadecimal.
+    pub sha256: Option<String>,
+    /// Encoding of 8-bit pictures.
+    pub encoding: Option<Encoding>,
+    /// Mosaic pattern of a picture that cannot say so itself.
+    pub cfa: Option<Cfa>,
+    /// "table" for the board picture that fixes the rig frame.
+    pub pose: Option<String>,
+    /// When, if stated.
+    pub captured: Option<jiff::Timestamp>,
+    /// How often it was tried.
+    pub attempts: Option<u32>,
+    /// Pins as read back when the shutter opened.
+    pub pins_open: Option<u32>,
+    /// Pins as read back when it closed.
+    pub pins_close: Option<u32>,
+    /// The board's clock.
+    pub board_ms: Option<u64>,
+    /// A light repeated to see drift; not used in the solve.
+    pub drift_check: bool,
+}
+
+/// How an 8-bit picture encodes light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Proportional.
+    Linear,
+    /// sRGB's curve.
+    Srgb,
+}
