@@ -1,0 +1,36 @@
+# make demo    simulate a rig, scan a swatch, solve it, and open the report's folder: the whole job, no hardware
+# make test    every test
+# make build   the release executables with every feature, in target/release
+# make bench   run time against error and against touching the bytes once
+SHELL := /bin/bash
+.DEFAULT_GOAL := build
+
+LINKER_PACKAGES := gcc libc6-dev
+# Chessboards are found by OpenCV; its bindings are generated with clang.
+OPENCV_PACKAGES := g++ pkg-config clang libclang-dev libopencv-dev
+
+.PHONY: demo test build bench packages-demo packages-all
+
+packages-demo:
+	@bash .ci/packages $(LINKER_PACKAGES)
+
+packages-all:
+	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES)
+
+demo: packages-demo
+	cargo run --release --locked --quiet -- demo --out demo
+
+# nextest where it is there: it runs the tests of several executables side by side.
+test: packages-all
+	@if cargo nextest --version >/dev/null 2>&1; then \
+	    cargo nextest run --locked --workspace --all-features; \
+	else \
+	    cargo test --locked --workspace --all-features --lib --bins --tests; \
+	fi
+	cargo test --locked --workspace --all-features --doc --quiet
+
+build: packages-all
+	cargo build --release --locked --workspace --all-features
+
+bench: packages-all
+	cargo bench --locked --all-features

@@ -1,0 +1,135 @@
+//! House rules as tests: which crate and which room may use which, and how long a file may be.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A longer file must say why in a line that starts with `//! Long because`.
+const LONGEST_FILE: usize = 600;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn files_below(folder: &str, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![root().join(folder)];
+    while let Some(folder) = open.pop() {
+        let Ok(entries) = fs::read_dir(&folder) else { continue };
+        for entry in entries.map(|entry| entry.unwrap().path()) {
+            if entry.is_dir() {
+                open.push(entry);
+            } else if entry.extension().is_some_and(|e| e == extension) {
+                found.push(entry);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Places in `folder` whose code (comments aside) contains one of `words`.
+fn mentions(folder: &str, words: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for file in files_below(folder, "rs") {
+        for (number, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
+            let code = !line.trim_start().starts_with("//");
+            if code && words.iter().any(|word| line.contains(word)) {
+                found.push(format!("{}:{}: {}", file.display(), number + 1, line.trim()));
+            }
+        }
+    }
+    found
+}
+
+fn expect_none(rule: &str, found: &[String]) {
+    assert!(found.is_empty(), "{rule}:\n{}", found.join("\n"));
+}
+
+#[test]
+fn crates_depend_one_way() {
+    let check = |manifest: &str, forbidden: &[&str]| {
+        let text = fs::read_to_string(root().join(manifest)).unwrap();
+        let table: toml::Table = toml::from_str(&text).unwrap();
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let Some(dependencies) = table.get(section).and_then(|s| s.as_table()) else { continue };
+            for name in forbidden {
+                assert!(!dependencies.contains_key(*name), "{manifest}: {section} must not name {name}");
+            }
+        }
+    };
+    let windows = ["egui", "eframe", "egui_extras", "egui_plot", "rfd"];
+    let ours = ["weavelight-sim", "weavelight", "weavelight-app"];
+    check("calibration/Cargo.toml", &[&windows[..], &ours[..]].concat());
+    check("sim/Cargo.toml", &[&windows[..], &ours[1..], &["opencv"]].concat());
+    check("Cargo.toml", &[&windows[..], &ours[2..], &["opencv"]].concat());
+}
+
+#[test]
+fn the_simulator_takes_descriptions_only() {
+    let found: Vec<String> = mentions("sim/src", &["weavelight_calibration"])
+        .into_iter()
+        .filter(|place| !place.contains("weavelight_calibration::description"))
+        .collect();
+    expect_none("sim may use weavelight_calibration::description and nothing else of it", &found);
+}
+
+#[test]
+fn opencv_stays_in_one_module() {
+    let modules: BTreeSet<String> = ["calibration/src", "sim/src", "src"]
+        .iter()
+        .flat_map(|folder| mentions(folder, &["opencv::"]))
+        .filter_map(|place| place.split(':').next().map(str::to_owned))
+        .collect();
+    assert!(modules.len() <= 1, "OpenCV is used in more than one module: {modules:?}");
+}
+
+#[test]
+fn rooms_use_only_the_rooms_below_them() {
+    let check = |room: &str, forbidden: &[&str]| {
+        let words: Vec<String> = forbidden.iter().map(|above| format!("crate::{above}")).collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        expect_none(&format!("src/{room} reaches upward"), &mentions(&format!("src/{room}"), &words));
+    };
+    let top = ["cli", "report", "calibrate", "solve", "simulate", "solution", "photometry"];
+    check("files", &[&top[..], &["raster", "raw", "session", "instrument"]].concat());
+    check("photometry", &["files", "raster", "raw", "session", "instrument", "solution", "solve", "cli", "report"]);
+    check("raster", &[&top[..], &["session", "instrument"]].concat());
+    check("raw", &[&top[..], &["session", "instrument"]].concat());
+    check("session", &top);
+    check("instrument", &top);
+    check("solution", &["cli", "report", "calibrate", "solve", "simulate", "photometry"]);
+    check("solve", &["cli", "report", "calibrate", "simulate"]);
+    check("simulate", &["cli", "report", "calibrate", "solve", "photometry"]);
+    check("calibrate", &["cli", "simulate"]);
+    check("report", &["cli", "simulate"]);
+}
+
+#[test]
+fn the_kernels_do_no_input_or_output() {
+    let words = ["std::fs", "std::io", "std::thread", "std::time", "rayon", "tracing::"];
+    expect_none("src/photometry: data in, data out", &mentions("src/photometry", &words));
+    expect_none("calibration: data in, data out", &mentions("calibration/src", &words));
+}
+
+#[test]
+fn nobody_asks_whether_the_instrument_is_simulated() {
+    for folder in ["calibration/src", "src"] {
+        expect_none("an implementation behind a trait is not asked what it is", &mentions(folder, &["fn is_simulated"]));
+    }
+}
+
+#[test]
+fn no_file_is_longer_than_agreed_without_a_reason() {
+    let mut long = Vec::new();
+    for folder in ["calibration/src", "sim/src", "src", "app", "tests"] {
+        for file in files_below(folder, "rs") {
+            let text = fs::read_to_string(&file).unwrap();
+            let lines = text.lines().count();
+            if lines > LONGEST_FILE && !text.contains("//! Long because") {
+                long.push(format!("{}: {lines} lines", file.display()));
+            }
+        }
+    }
+    expect_none("files over 600 lines", &long);
+}
