@@ -51,6 +51,9 @@ pub struct RowOutput<'a> {
     pub residual: &'a mut [f32],
     /// What became of each photosite.
     pub outcome: &'a mut [Outcome],
+    /// Where asked for: bit i is set if the sample of light i took part in the fit; 0 where unsolved. (Colour pictures find
+    /// the albedo of each channel from the samples that the normal rests on.)
+    pub kept: Option<&'a mut [u64]>,
 }
 
 /// What became of a photosite.
