@@ -12,6 +12,7 @@
 //! - [`simulate`]: the simulated rig's folders
 //! - [`report`]: what a command tells
 
+pub mod files;
 pub mod instrument;
 pub mod photometry;
 pub mod raw;

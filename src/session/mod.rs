@@ -1,8 +1,22 @@
 //! The capture session: a folder with `session.toml` and the frames as the camera wrote them. The hub that scanning,
 //! importing and simulating write and everything else reads.
 
+mod check;
+mod error;
+mod format;
+mod frames;
+#[cfg(test)]
+mod tests;
+mod writer;
+
+pub use error::SessionError;
+pub use writer::SessionWriter;
+
 use std::path::PathBuf;
 use weavelight_calibration::description::{Cfa, Plane};
+
+/// The manifest's name in its folder.
+pub const MANIFEST: &str = "session.toml";
 
 /// A capture session as its `session.toml` describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,4 +125,47 @@ pub enum Encoding {
     Linear,
     /// sRGB's curve.
     Srgb,
+}
+
+impl FrameEntry {
+    /// A frame with what every frame has; the rest absent.
+    pub fn new(file: impl Into<PathBuf>, light: Option<usize>, exposure_s: f64, iso: f64) -> Self {
+        Self {
+            file: file.into(),
+            light,
+            exposure_s,
+            iso,
+            sha256: None,
+            encoding: None,
+            cfa: None,
+            pose: None,
+            captured: None,
+            attempts: None,
+            pins_open: None,
+            pins_close: None,
+            board_ms: None,
+            drift_check: false,
+        }
+    }
+}
+
+impl Session {
+    /// An empty capture session, not yet on disk.
+    pub fn new(folder: impl Into<PathBuf>, kind: Kind, name: impl Into<String>) -> Self {
+        Self {
+            folder: folder.into(),
+            kind,
+            name: name.into(),
+            captured: None,
+            plane: None,
+            target: None,
+            frames: Vec::new(),
+            mask: None,
+        }
+    }
+
+    /// The plane that was imaged: the stated one, else the table.
+    pub fn plane_or_table(&self) -> Plane {
+        self.plane.clone().unwrap_or_else(Plane::table)
+    }
 }

@@ -1,0 +1,118 @@
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What goes wrong with files. Each message says what, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The file or folder could not be read.
+    #[error("{}: {}", .path.display(), read_advice(.source))]
+    Read {
+        /// What was to be read.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The file or folder could not be written.
+    #[error("{}: {}", .path.display(), write_advice(.source))]
+    Write {
+        /// What was to be written.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The text is not what the format allows.
+    #[error("{}:{line}: {what}", .path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong and what to do.
+        what: String,
+    },
+    /// The file is of another version of the format.
+    #[error("{}:{line}: schema {found}, but this version reads schema {supported}; use the weavelight that wrote it", .path.display())]
+    Schema {
+        /// The file.
+        path: PathBuf,
+        /// Line of the number.
+        line: usize,
+        /// The number found.
+        found: i64,
+        /// The number read.
+        supported: i64,
+    },
+    /// A number about to be written is NaN or infinite.
+    #[error("{}: `{key}` is not a finite number and was not written; this is a fault of the computation before it", .path.display())]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: String,
+    },
+    /// Something about to be written does not fit the format.
+    #[error("{}: cannot be written: {what}", .path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        what: String,
+    },
+    /// The output folder already holds something else.
+    #[error("{}: holds {found}, which is no earlier {kind}; choose an empty or new folder with --out", .path.display())]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+        /// A file or folder in it.
+        found: String,
+        /// What was to be written.
+        kind: &'static str,
+    },
+}
+
+impl FileError {
+    /// An error from reading `path`.
+    pub fn read(path: &Path, source: io::Error) -> Self {
+        Self::Read { path: path.to_owned(), source }
+    }
+
+    /// An error from writing `path`.
+    pub fn write(path: &Path, source: io::Error) -> Self {
+        Self::Write { path: path.to_owned(), source }
+    }
+}
+
+fn read_advice(source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::NotFound => "not found; check the path".to_owned(),
+        io::ErrorKind::PermissionDenied => "may not be read; check its permissions".to_owned(),
+        io::ErrorKind::InvalidData => {
+            "is not UTF-8 text; check that this is the right file".to_owned()
+        }
+        io::ErrorKind::IsADirectory => {
+            "is a folder where a file is expected; name the file".to_owned()
+        }
+        io::ErrorKind::NotADirectory => {
+            "a part of this path is a file, not a folder; check the path".to_owned()
+        }
+        _ => format!("cannot be read ({source}); check the disk and the path"),
+    }
+}
+
+fn write_advice(source: &io::Error) -> String {
+    match source.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "no space left on this disk; free some or choose another --out".to_owned()
+        }
+        io::ErrorKind::ReadOnlyFilesystem => {
+            "the disk is read-only; choose another --out".to_owned()
+        }
+        io::ErrorKind::PermissionDenied => {
+            "may not be written; check its permissions or choose another --out".to_owned()
+        }
+        io::ErrorKind::NotADirectory => {
+            "a part of this path is a file, not a folder; choose another --out".to_owned()
+        }
+        _ => format!("cannot be written ({source}); check the disk or choose another --out"),
+    }
+}

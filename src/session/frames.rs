@@ -1,0 +1,80 @@
+use super::{FrameEntry, MANIFEST, Session, SessionError};
+use crate::files::{FileError, sha256_hex};
+use std::io;
+use std::path::PathBuf;
+
+impl Session {
+    /// The manifest's path.
+    pub fn manifest_path(&self) -> PathBuf {
+        self.folder.join(MANIFEST)
+    }
+
+    /// Where a frame is.
+    pub fn frame_path(&self, frame: &FrameEntry) -> PathBuf {
+        self.folder.join(&frame.file)
+    }
+
+    /// Where the mask is, if there is one.
+    pub fn mask_path(&self) -> Option<PathBuf> {
+        self.mask.as_ref().map(|mask| self.folder.join(mask))
+    }
+
+    /// The bytes of a frame's file, checked against the recorded hash: what is decoded is what was hashed.
+    ///
+    /// # Errors
+    /// Where the file is missing, unreadable or altered.
+    pub fn read_frame(&self, frame: &FrameEntry) -> Result<Vec<u8>, SessionError> {
+        let path = self.frame_path(frame);
+        let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound => SessionError::FrameMissing { path: path.clone() },
+            _ => FileError::read(&path, source).into(),
+        })?;
+        self.verify(frame, &bytes)?;
+        Ok(bytes)
+    }
+
+    /// Compares the bytes of a frame with the recorded hash; fine where none is recorded.
+    ///
+    /// # Errors
+    /// Where they differ.
+    pub fn verify(&self, frame: &FrameEntry, bytes: &[u8]) -> Result<(), SessionError> {
+        let Some(recorded) = &frame.sha256 else { return Ok(()) };
+        let found = sha256_hex(bytes);
+        if found == *recorded {
+            return Ok(());
+        }
+        Err(SessionError::FrameAltered {
+            path: self.frame_path(frame),
+            found,
+            recorded: recorded.clone(),
+        })
+    }
+
+    /// Sees that every frame's file is there, before work begins.
+    ///
+    /// # Errors
+    /// The first one, in the manifest's order, that is not.
+    pub fn check_files(&self) -> Result<(), SessionError> {
+        let missing =
+            self.frames.iter().map(|frame| self.frame_path(frame)).find(|path| !path.is_file());
+        missing.map_or(Ok(()), |path| Err(SessionError::FrameMissing { path }))
+    }
+
+    /// Sees that every frame is of a light below `count`.
+    ///
+    /// # Errors
+    /// The first frame of another light.
+    pub fn check_lights(&self, count: usize) -> Result<(), SessionError> {
+        let unknown = self
+            .frames
+            .iter()
+            .find_map(|frame| frame.light.filter(|l| *l >= count).map(|l| (frame, l)));
+        let Some((frame, light)) = unknown else { return Ok(()) };
+        Err(SessionError::UnknownLight {
+            session: self.manifest_path(),
+            file: frame.file.display().to_string(),
+            light,
+            last: count.saturating_sub(1),
+        })
+    }
+}
