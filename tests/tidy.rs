@@ -52,9 +52,14 @@ fn crates_depend_one_way() {
         let text = fs::read_to_string(root().join(manifest)).unwrap();
         let table: toml::Table = toml::from_str(&text).unwrap();
         for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
-            let Some(dependencies) = table.get(section).and_then(|s| s.as_table()) else { continue };
+            let Some(dependencies) = table.get(section).and_then(|s| s.as_table()) else {
+                continue;
+            };
             for name in forbidden {
-                assert!(!dependencies.contains_key(*name), "{manifest}: {section} must not name {name}");
+                assert!(
+                    !dependencies.contains_key(*name),
+                    "{manifest}: {section} must not name {name}"
+                );
             }
         }
     };
@@ -89,11 +94,17 @@ fn rooms_use_only_the_rooms_below_them() {
     let check = |room: &str, forbidden: &[&str]| {
         let words: Vec<String> = forbidden.iter().map(|above| format!("crate::{above}")).collect();
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        expect_none(&format!("src/{room} reaches upward"), &mentions(&format!("src/{room}"), &words));
+        expect_none(
+            &format!("src/{room} reaches upward"),
+            &mentions(&format!("src/{room}"), &words),
+        );
     };
     let top = ["cli", "report", "calibrate", "solve", "simulate", "solution", "photometry"];
     check("files", &[&top[..], &["raster", "raw", "session", "instrument"]].concat());
-    check("photometry", &["files", "raster", "raw", "session", "instrument", "solution", "solve", "cli", "report"]);
+    check(
+        "photometry",
+        &["files", "raster", "raw", "session", "instrument", "solution", "solve", "cli", "report"],
+    );
     check("raster", &[&top[..], &["session", "instrument"]].concat());
     check("raw", &[&top[..], &["session", "instrument"]].concat());
     check("session", &top);
@@ -115,7 +126,10 @@ fn the_kernels_do_no_input_or_output() {
 #[test]
 fn nobody_asks_whether_the_instrument_is_simulated() {
     for folder in ["calibration/src", "src"] {
-        expect_none("an implementation behind a trait is not asked what it is", &mentions(folder, &["fn is_simulated"]));
+        expect_none(
+            "an implementation behind a trait is not asked what it is",
+            &mentions(folder, &["fn is_simulated"]),
+        );
     }
 }
 

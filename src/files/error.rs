@@ -30,6 +30,14 @@ pub enum FileError {
         /// What is wrong and what to do.
         what: String,
     },
+    /// The content is not what the file's name promises.
+    #[error("{}: {what}", .path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        what: String,
+    },
     /// The file is of another version of the format.
     #[error("{}:{line}: schema {found}, but this version reads schema {supported}; use the weavelight that wrote it", .path.display())]
     Schema {

@@ -1,8 +1,26 @@
 //! The instrument on disk: `rig.toml` as the technician describes it, and the calibration folder.
 
+mod calibration;
+mod camera_file;
+mod color_file;
+mod gain_map;
+mod lights_file;
+mod rig_file;
+#[cfg(test)]
+mod tests;
+
+pub use calibration::CalibrationProvenance;
+pub use camera_file::{CAMERA_FILE, write_camera};
+pub use color_file::{COLOR_FILE, write_color};
+pub use lights_file::{LIGHTS_FILE, write_lights};
+
 use nalgebra::{Matrix3, Point3, UnitVector3};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use weavelight_calibration::description::{Camera, Image, Light};
+
+/// How many lights a rig has.
+pub const LIGHT_COUNT: RangeInclusive<usize> = 3..=64;
 
 /// `rig.toml`: the instrument as the technician describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +86,7 @@ pub enum Controller {
 /// One LED of a rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigLight {
-    /// Output of the controller.
+    /// Output of the controller; where absent, the light's index.
     pub channel: Option<u32>,
     /// Where it is.
     pub place: RigLightPlace,
@@ -96,12 +114,16 @@ pub enum RigLightPlace {
 pub struct Calibration {
     /// The folder.
     pub folder: PathBuf,
-    /// `camera.toml`; absent for imported picture sets under directional light.
+    /// `camera.toml`; absent for imported picture sets under directional light, and before `calibrate camera`.
     pub camera: Option<Camera>,
-    /// `color.toml`.
+    /// Root mean square distance of the board's corners from where the camera model puts them.
+    pub rms_reprojection_px: Option<f64>,
+    /// `color.toml`; where there is none, everything comes from the frames.
     pub color: Color,
-    /// `lights.toml`, in the rig's order.
+    /// `lights.toml`, in the rig's order; empty before `calibrate lights`.
     pub lights: Vec<CalibratedLight>,
+    /// What each file records of its making.
+    pub provenance: CalibrationProvenance,
 }
 
 /// `color.toml`. What is absent comes from the frame's own file.
@@ -145,4 +167,30 @@ pub struct CalibratedLight {
     pub position_claimed: Option<bool>,
     /// What the fit had to say.
     pub warnings: Vec<String>,
+}
+
+impl Default for Color {
+    fn default() -> Self {
+        Self {
+            black_level: None,
+            saturation_level: None,
+            response: vec![0.0, 1.0],
+            camera_to_linear_srgb: None,
+            white_balance: Vec::new(),
+            noise: None,
+        }
+    }
+}
+
+impl CalibratedLight {
+    /// A light of which nothing but its model is known.
+    pub fn new(light: Light) -> Self {
+        Self {
+            light,
+            gain_map: None,
+            position_sigma_mm: None,
+            position_claimed: None,
+            warnings: Vec::new(),
+        }
+    }
 }

@@ -1,8 +1,9 @@
 //! What a manifest may say beyond its types: each problem as (key, what is wrong and what to do).
 
 use super::{Board, FrameEntry, Patch, Session};
+use crate::files::inside_folder;
 use std::collections::HashMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 type Problem = (String, String);
 
@@ -103,21 +104,4 @@ fn check_path(key: &str, path: &Path) -> Result<(), Problem> {
 
 fn problem(key: &str, what: String) -> Result<(), Problem> {
     Err((key.to_owned(), what))
-}
-
-/// A file name that stays inside the capture session's folder.
-pub(super) fn inside_folder(name: &str) -> Result<PathBuf, String> {
-    let path = Path::new(name);
-    let plain =
-        path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if name.is_empty()
-        || name.contains(['\\', '\0', '\n', '\r'])
-        || !plain
-        || path.file_name().is_none()
-    {
-        return Err(format!(
-            "is {name:?}; name a file inside the capture session's folder, without .. or a leading /"
-        ));
-    }
-    Ok(path.to_owned())
 }

@@ -1,9 +1,10 @@
 //! `session.toml` itself: the keys of the format, to and from the types the program works with.
 
-use super::check::{check_manifest, inside_folder};
+use super::check::check_manifest;
 use super::{Board, Encoding, FrameEntry, Kind, MANIFEST, Patch, Session, SessionError, Target};
 use crate::files::{
-    Document, FileError, SCHEMA, datetime_from_timestamp, timestamp_from_datetime, write_toml,
+    Document, FileError, SCHEMA, datetime_from_timestamp, inside_folder, timestamp_from_datetime,
+    write_toml,
 };
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -1,0 +1,127 @@
+//! `camera.toml`: the keys of the format, to and from [`Camera`].
+
+use super::rig_file::{check_positive, check_size};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
+use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use weavelight_calibration::description::Camera;
+
+/// The file's name in a calibration folder.
+pub const CAMERA_FILE: &str = "camera.toml";
+
+/// How far a rotation's rows may be from unit length and right angles: digits rounded off by hand, not a mistake.
+const ROTATION_SLACK: f64 = 1e-3;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraFile {
+    schema: i64,
+    width_px: usize,
+    height_px: usize,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    #[serde(default)]
+    distortion: [f64; 5],
+    /// Rows; camera from rig.
+    rotation: [[f64; 3]; 3],
+    translation_mm: [f64; 3],
+    rms_reprojection_px: Option<f64>,
+    #[serde(default)]
+    provenance: ProvenanceTable,
+}
+
+type Read = (Camera, Option<f64>, Provenance);
+
+/// The folder's camera with its reprojection error, or `None` where there is no such file.
+pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
+    let path = folder.join(CAMERA_FILE);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let document = Document::read(&path)?;
+    let file: CameraFile = document.parse(SCHEMA)?;
+    let camera = camera_from_file(&document, &file)?;
+    Ok(Some((camera, file.rms_reprojection_px, file.provenance.into())))
+}
+
+/// Writes `camera.toml` into a calibration folder, which is made where absent.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn write_camera(
+    folder: &Path,
+    camera: &Camera,
+    rms_reprojection_px: Option<f64>,
+    provenance: &Provenance,
+) -> Result<(), FileError> {
+    std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    let pose = &camera.camera_from_rig;
+    let file = CameraFile {
+        schema: SCHEMA,
+        width_px: camera.width_px,
+        height_px: camera.height_px,
+        fx: camera.fx,
+        fy: camera.fy,
+        cx: camera.cx,
+        cy: camera.cy,
+        distortion: camera.distortion,
+        // nalgebra stores columns; the file has rows.
+        rotation: pose.rotation.matrix().transpose().into(),
+        translation_mm: pose.translation.vector.into(),
+        rms_reprojection_px,
+        provenance: provenance.into(),
+    };
+    write_toml(&folder.join(CAMERA_FILE), &file)
+}
+
+fn camera_from_file(document: &Document, file: &CameraFile) -> Result<Camera, FileError> {
+    check_size(document, "width_px", file.width_px)?;
+    check_size(document, "height_px", file.height_px)?;
+    check_positive(document, "fx", Some(file.fx))?;
+    check_positive(document, "fy", Some(file.fy))?;
+    let rotation = rotation_from_rows(document, &file.rotation)?;
+    if file.translation_mm[2] <= 0.0 {
+        let what = "puts the scan area behind the camera; its z must be positive";
+        return Err(document.invalid("translation_mm", what));
+    }
+    let translation = Translation3::from(Vector3::from(file.translation_mm));
+    Ok(Camera {
+        width_px: file.width_px,
+        height_px: file.height_px,
+        fx: file.fx,
+        fy: file.fy,
+        cx: file.cx,
+        cy: file.cy,
+        distortion: file.distortion,
+        camera_from_rig: IsometryMatrix3::from_parts(translation, rotation),
+    })
+}
+
+fn rotation_from_rows(
+    document: &Document,
+    rows: &[[f64; 3]; 3],
+) -> Result<Rotation3<f64>, FileError> {
+    let stated = Matrix3::from(*rows).transpose();
+    let invalid = || {
+        document.invalid(
+            "rotation",
+            "is no rotation; its rows must be unit vectors at right angles, right-handed",
+        )
+    };
+    let off = (stated * stated.transpose() - Matrix3::identity()).abs().max();
+    if off > ROTATION_SLACK || stated.determinant() < 0.0 {
+        return Err(invalid());
+    }
+    // Written with enough digits it is a rotation already and stays the same to the last bit.
+    if off < 1e-14 {
+        return Ok(Rotation3::from_matrix_unchecked(stated));
+    }
+    let svd = stated.svd(true, true);
+    match (svd.u, svd.v_t) {
+        (Some(u), Some(v_t)) => Ok(Rotation3::from_matrix_unchecked(u * v_t)),
+        _ => Err(invalid()),
+    }
+}

@@ -1,0 +1,151 @@
+//! `color.toml`: the keys of the format, to and from [`Color`].
+
+use super::rig_file::check_positive;
+use super::{Color, Noise};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// The file's name in a calibration folder.
+pub const COLOR_FILE: &str = "color.toml";
+
+/// How far a row of the colour matrix may be from summing to 1: rounded digits.
+const ROW_SUM_SLACK: f64 = 5e-3;
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ColorFile {
+    schema: i64,
+    black_level: Option<[f64; 4]>,
+    saturation_level: Option<f64>,
+    #[serde(default = "linear")]
+    response: Vec<f64>,
+    camera_to_linear_srgb: Option<[[f64; 3]; 3]>,
+    noise: Option<NoiseTable>,
+    #[serde(default)]
+    provenance: ProvenanceTable,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lights: Vec<LightTable>,
+}
+
+fn linear() -> Vec<f64> {
+    vec![0.0, 1.0]
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct NoiseTable {
+    electrons_per_dn: f64,
+    read_noise_e: f64,
+    #[serde(default)]
+    kappa: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LightTable {
+    white_balance: [f64; 3],
+}
+
+/// The folder's colour calibration, or `None` where there is no such file.
+pub(super) fn read(folder: &Path) -> Result<Option<(Color, Provenance)>, FileError> {
+    let path = folder.join(COLOR_FILE);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let document = Document::read(&path)?;
+    let file: ColorFile = document.parse(SCHEMA)?;
+    check(&document, &file)?;
+    let noise = |n: NoiseTable| Noise {
+        electrons_per_dn: n.electrons_per_dn,
+        read_noise_e: n.read_noise_e,
+        kappa: n.kappa,
+    };
+    let color = Color {
+        black_level: file.black_level,
+        saturation_level: file.saturation_level,
+        response: file.response,
+        // nalgebra stores columns; the file has rows.
+        camera_to_linear_srgb: file
+            .camera_to_linear_srgb
+            .map(|rows| Matrix3::from(rows).transpose()),
+        white_balance: file.lights.into_iter().map(|light| light.white_balance).collect(),
+        noise: file.noise.map(noise),
+    };
+    Ok(Some((color, file.provenance.into())))
+}
+
+/// Writes `color.toml` into a calibration folder, which is made where absent.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn write_color(folder: &Path, color: &Color, provenance: &Provenance) -> Result<(), FileError> {
+    std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    let noise = |n: Noise| NoiseTable {
+        electrons_per_dn: n.electrons_per_dn,
+        read_noise_e: n.read_noise_e,
+        kappa: n.kappa,
+    };
+    let file = ColorFile {
+        schema: SCHEMA,
+        black_level: color.black_level,
+        saturation_level: color.saturation_level,
+        response: color.response.clone(),
+        camera_to_linear_srgb: color.camera_to_linear_srgb.map(|matrix| matrix.transpose().into()),
+        noise: color.noise.map(noise),
+        provenance: provenance.into(),
+        lights: color
+            .white_balance
+            .iter()
+            .map(|gains| LightTable { white_balance: *gains })
+            .collect(),
+    };
+    write_toml(&folder.join(COLOR_FILE), &file)
+}
+
+fn check(document: &Document, file: &ColorFile) -> Result<(), FileError> {
+    check_levels(document, file)?;
+    if !file.response.iter().skip(1).any(|c| *c != 0.0) {
+        let what = "does not depend on the signal; [0, 1] is linear, and the second coefficient belongs to x";
+        return Err(document.invalid("response", what));
+    }
+    for (k, row) in file.camera_to_linear_srgb.iter().flatten().enumerate() {
+        let sum: f64 = row.iter().sum();
+        if (sum - 1.0).abs() > ROW_SUM_SLACK {
+            let what = format!("sums to {sum}; rows sum to 1, so that white stays white");
+            return Err(document.invalid(&format!("camera_to_linear_srgb.{k}"), &what));
+        }
+    }
+    for (k, light) in file.lights.iter().enumerate() {
+        for gain in light.white_balance {
+            check_positive(document, &format!("lights.{k}.white_balance"), Some(gain))?;
+        }
+    }
+    file.noise.as_ref().map_or(Ok(()), |noise| check_noise(document, noise))
+}
+
+fn check_levels(document: &Document, file: &ColorFile) -> Result<(), FileError> {
+    let darkest =
+        file.black_level.map(|levels| levels.into_iter().fold(f64::NEG_INFINITY, f64::max));
+    match (file.saturation_level, darkest) {
+        (Some(saturation), Some(black)) if saturation <= black => {
+            let what = format!(
+                "is {saturation}, not above the black level {black}; both are raw numbers, black included"
+            );
+            Err(document.invalid("saturation_level", &what))
+        }
+        (saturation, _) => check_positive(document, "saturation_level", saturation),
+    }
+}
+
+fn check_noise(document: &Document, noise: &NoiseTable) -> Result<(), FileError> {
+    check_positive(document, "noise.electrons_per_dn", Some(noise.electrons_per_dn))?;
+    for (name, value) in [("read_noise_e", noise.read_noise_e), ("kappa", noise.kappa)] {
+        if value < 0.0 {
+            return Err(document
+                .invalid(&format!("noise.{name}"), &format!("is {value}; it cannot be negative")));
+        }
+    }
+    Ok(())
+}

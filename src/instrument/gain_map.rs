@@ -1,0 +1,60 @@
+//! Gain maps as EXR pictures.
+
+use crate::files::FileError;
+use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
+use std::io::Cursor;
+use std::path::Path;
+use weavelight_calibration::description::Image;
+
+/// Reads a gain map: R, G, B, every value finite and positive.
+pub(super) fn read_gain_map(path: &Path) -> Result<Image<[f32; 3]>, FileError> {
+    let bytes = std::fs::read(path).map_err(|source| FileError::read(path, source))?;
+    let wrong = |what: String| {
+        let remedy = "restore the file or run `weavelight calibrate lights` again";
+        FileError::Content { path: path.to_owned(), what: format!("{what}; {remedy}") }
+    };
+    let picture = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| Image::filled(size.width(), size.height(), [0f32; 3]),
+            |image: &mut Image<[f32; 3]>, place, (r, g, b): (f32, f32, f32)| {
+                image.data[place.y() * image.width + place.x()] = [r, g, b];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| wrong(format!("is no RGB OpenEXR picture ({error})")))?;
+    let map = picture.layer_data.channel_data.pixels;
+    match map.data.iter().flatten().find(|gain| !(gain.is_finite() && **gain > 0.0)) {
+        Some(gain) => Err(wrong(format!("holds the gain {gain}; gains are positive"))),
+        None => Ok(map),
+    }
+}
+
+/// The bytes of a gain map's EXR file.
+pub(super) fn encode_gain_map(
+    folder: &Path,
+    light: usize,
+    map: &Image<[f32; 3]>,
+) -> Result<Vec<u8>, FileError> {
+    let unwritable = |what| FileError::Unwritable { path: folder.to_owned(), what };
+    if map.data.is_empty()
+        || map.data.iter().flatten().any(|gain| !(gain.is_finite() && *gain > 0.0))
+    {
+        return Err(unwritable(format!(
+            "the gain map of light {light} has gains that are not positive"
+        )));
+    }
+    let channels = exr::prelude::SpecificChannels::rgb(|place: exr::prelude::Vec2<usize>| {
+        let [r, g, b] = *map.at(place.x(), place.y());
+        (r, g, b)
+    });
+    let mut bytes = Cursor::new(Vec::new());
+    exr::prelude::Image::from_channels((map.width, map.height), channels)
+        .write()
+        .to_buffered(&mut bytes)
+        .map_err(|error| unwritable(format!("the gain map of light {light}: {error}")))?;
+    Ok(bytes.into_inner())
+}
