@@ -1,7 +1,33 @@
 //! The kernels, on one row of photosites at a time: data in, data out; no I/O, clock, thread or log.
 //!
 //! What enters is already normalised (see [`RowInput::signal`]), so that every method is about geometry and noise alone.
+//!
+//! - [`solve_pixel`] and [`reference_row`]: plain float64, the definition of every method
+//! - [`normalise_row`]: raw numbers to input
+//! - [`RowSolver`]: the same answers, fast
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "kernels walk several arrays lane by lane; zips of six hide the formula"
+)]
+
+mod block;
+mod least_squares;
+mod method;
+mod normal_equations;
+mod normalise;
+mod pieces;
+mod reference;
 mod row;
+mod solve_row;
+mod surface;
+mod weighted;
 
-pub use row::{FieldRow, Outcome, RowInput, RowOutput, VarianceModel};
+#[cfg(test)]
+mod tests;
+
+pub use method::{MAX_LIGHTS, Method};
+pub use normalise::{Normalisation, normalise_row};
+pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
+pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, VarianceModel};
+pub use solve_row::RowSolver;

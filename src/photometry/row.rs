@@ -1,3 +1,10 @@
+//! What the kernels share with the solve that calls them: one row in, one row out.
+
+use nalgebra::Vector3;
+use thiserror::Error;
+
+use super::method::MAX_LIGHTS;
+
 /// One row of photosites, as every kernel reads it.
 ///
 /// Symbols: y_i = rho (l_i . n) + noise, with l_i the light vector of light i (unit direction times falloff, rig frame, in
@@ -28,6 +35,31 @@ pub struct FieldRow<'a> {
     pub lights: usize,
 }
 
+impl FieldRow<'_> {
+    /// Vector of one light at a column, linear between the nodes, constant beyond the last.
+    pub fn at(&self, column: usize, light: usize) -> Vector3<f64> {
+        let (node, t) = self.place(column);
+        let (a, b) = (self.node(node, light), self.node(node + 1, light));
+        a + (b - a) * t
+    }
+
+    /// Nodes of the row.
+    pub fn nodes(&self) -> usize {
+        self.vectors.len() / self.lights.max(1)
+    }
+
+    /// The node left of a column and how far on it stands towards the next, 0 to 1.
+    fn place(&self, column: usize) -> (usize, f64) {
+        let step = self.step.max(1);
+        (column / step, (column % step) as f64 / step as f64)
+    }
+
+    fn node(&self, node: usize, light: usize) -> Vector3<f64> {
+        let last = self.nodes().saturating_sub(1);
+        Vector3::from(self.vectors[node.min(last) * self.lights + light])
+    }
+}
+
 /// var(y) = shot * y + floor + (kappa y)^2, in units of y squared.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VarianceModel {
@@ -56,6 +88,17 @@ pub struct RowOutput<'a> {
     pub kept: Option<&'a mut [u64]>,
 }
 
+impl RowOutput<'_> {
+    /// Marks a photosite as unsolved.
+    pub(crate) fn clear(&mut self, column: usize, outcome: Outcome) {
+        self.normal[column] = [0.0; 3];
+        self.albedo[column] = 0.0;
+        self.expected_error_deg[column] = 0.0;
+        self.residual[column] = 0.0;
+        self.outcome[column] = outcome;
+    }
+}
+
 /// What became of a photosite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
@@ -74,6 +117,52 @@ pub enum Outcome {
     CoplanarLights,
     /// No light comes back, or the fitted normal points away from the camera.
     NoSurface,
-    /// Outside the mask.
+    /// Outside the mask. The kernels never say so (they see only NaN, hence `TooFewLights`); the solve does.
     Masked,
+}
+
+/// A row whose parts do not belong together.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum RowError {
+    /// Fewer than 3 or more than 64 lights.
+    #[error("a row has {lights} lights; the kernels take 3 to {MAX_LIGHTS}")]
+    Lights {
+        /// Lights of the field.
+        lights: usize,
+    },
+    /// A slice of the wrong length.
+    #[error("a row's {part} has {found} entries where {expected} are needed")]
+    Length {
+        /// Which slice.
+        part: &'static str,
+        /// Its length.
+        found: usize,
+        /// What the field and the outcome slice ask for.
+        expected: usize,
+    },
+}
+
+/// Checks that input and output describe one and the same row.
+pub(crate) fn check_shapes(input: &RowInput, output: &RowOutput) -> Result<(), RowError> {
+    let (lights, width) = (input.field.lights, output.outcome.len());
+    if !(3..=MAX_LIGHTS).contains(&lights) {
+        return Err(RowError::Lights { lights });
+    }
+    let same = |part, found, expected| {
+        if found == expected { Ok(()) } else { Err(RowError::Length { part, found, expected }) }
+    };
+    same("list of signals", input.signal.len(), lights)?;
+    same("list of variances", input.variance.len(), lights)?;
+    for signal in input.signal {
+        same("signal", signal.len(), width)?;
+    }
+    if let Some(scale) = input.noise_scale {
+        same("noise scale", scale.len(), width)?;
+    }
+    same("normal", output.normal.len(), width)?;
+    same("albedo", output.albedo.len(), width)?;
+    same("expected error", output.expected_error_deg.len(), width)?;
+    same("residual", output.residual.len(), width)?;
+    let nodes = if width == 0 { 0 } else { (width - 1).div_ceil(input.field.step.max(1)) + 1 };
+    same("light field", input.field.vectors.len(), nodes.max(input.field.nodes()) * lights)
 }

@@ -1,0 +1,156 @@
+//! A row cut into pieces on which light vectors and pseudo-inverses are linear in the column, as float32 coefficients.
+//!
+//! The light vectors L (n x 3) are linear between the field's nodes by contract. Their pseudo-inverse P is not; but with
+//! P0 L0 = P1 L1 = I, the linear mix P(t) = (1 - t) P0 + t P1 gives
+//!
+//!   P(t) L(t) - I = t (1 - t) (P0 - P1) (L1 - L0),
+//!
+//! so the error that the mix makes on a Lambertian photosite is known exactly, and a piece is halved until it is small.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::reference::inverse_if_conditioned;
+use super::row::FieldRow;
+
+/// Largest error, relative to g, that interpolating pseudo-inverses may make (radians of the normal): 1.1e-4 degrees.
+const LARGEST_MIX_ERROR: f64 = 2e-6;
+
+/// Pieces are not cut below this many columns; what is still too curved then goes to float64.
+const SHORTEST_PIECE: usize = 8;
+
+/// Beyond this condition number of the light vectors, float32 misses the reference by more than 0.001 degrees.
+const FLOAT32_CONDITION: f64 = 40.0;
+
+/// Coefficients of one light on a piece: value at the piece's start and slope per column, x, y, z each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Linear {
+    pub(crate) at_start: [f32; 3],
+    pub(crate) per_column: [f32; 3],
+}
+
+/// Columns `start..end`; light i's coefficients stand at `first + i` of [`Pieces::light`] and [`Pieces::inverse`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Piece {
+    pub(crate) start: usize,
+    pub(crate) end: usize,
+    pub(crate) first: usize,
+    /// Whether float32 carries this piece.
+    pub(crate) float32: bool,
+}
+
+/// The pieces of a row. Light vectors are divided by `unit`, a power of two near the longest, so that float32 neither
+/// overflows nor underflows.
+#[derive(Default)]
+pub(crate) struct Pieces {
+    pub(crate) list: Vec<Piece>,
+    pub(crate) light: Vec<Linear>,
+    pub(crate) inverse: Vec<Linear>,
+    pub(crate) unit: f64,
+    left: Node,
+    right: Node,
+}
+
+/// Light vectors and their pseudo-inverse at one column.
+#[derive(Clone, Default)]
+struct Node {
+    column: usize,
+    light: Vec<Vector3<f64>>,
+    inverse: Vec<Vector3<f64>>,
+    /// At least the condition number; infinite where the lights lie in a plane.
+    condition: f64,
+}
+
+impl Pieces {
+    /// Cuts a row of `width` columns.
+    pub(crate) fn cut(&mut self, field: &FieldRow, width: usize) {
+        self.list.clear();
+        self.light.clear();
+        self.inverse.clear();
+        self.unit = unit_of(field);
+        let step = field.step.max(1);
+        let mut left = std::mem::take(&mut self.left);
+        let mut right = std::mem::take(&mut self.right);
+        left.place(field, 0, self.unit);
+        for start in (0..width).step_by(step) {
+            right.place(field, start + step, self.unit);
+            self.cut_between(field, &left, &right, width);
+            std::mem::swap(&mut left, &mut right);
+        }
+        (self.left, self.right) = (left, right);
+    }
+
+    fn cut_between(&mut self, field: &FieldRow, left: &Node, right: &Node, width: usize) {
+        if left.column >= width {
+            return;
+        }
+        let conditioned = left.condition.max(right.condition) < FLOAT32_CONDITION;
+        let length = right.column - left.column;
+        let straight = conditioned && mix_error(left, right) < LARGEST_MIX_ERROR;
+        if straight || !conditioned || length < 2 * SHORTEST_PIECE {
+            self.push(left, right, width, straight);
+            return;
+        }
+        let mut middle = Node::default();
+        middle.place(field, left.column + length / 2, self.unit);
+        self.cut_between(field, left, &middle, width);
+        self.cut_between(field, &middle, right, width);
+    }
+
+    fn push(&mut self, left: &Node, right: &Node, width: usize, float32: bool) {
+        let (start, end) = (left.column, right.column.min(width));
+        self.list.push(Piece { start, end, first: self.light.len(), float32 });
+        let columns = (right.column - left.column) as f64;
+        self.light.extend(
+            left.light.iter().zip(&right.light).map(|(a, b)| Linear::between(a, b, columns)),
+        );
+        self.inverse.extend(
+            left.inverse.iter().zip(&right.inverse).map(|(a, b)| Linear::between(a, b, columns)),
+        );
+    }
+}
+
+impl Linear {
+    fn between(a: &Vector3<f64>, b: &Vector3<f64>, columns: f64) -> Self {
+        let slope = (b - a) / columns;
+        Self { at_start: a.map(|v| v as f32).into(), per_column: slope.map(|v| v as f32).into() }
+    }
+}
+
+impl Node {
+    fn place(&mut self, field: &FieldRow, column: usize, unit: f64) {
+        self.column = column;
+        self.light.clear();
+        self.light.extend((0..field.lights).map(|i| field.at(column, i) / unit));
+        let normal_matrix: Matrix3<f64> =
+            self.light.iter().fold(Matrix3::zeros(), |sum, l| sum + l * l.transpose());
+        self.inverse.clear();
+        match inverse_if_conditioned(&normal_matrix) {
+            Some(inverse) => {
+                self.condition = (normal_matrix.trace() * inverse.trace()).sqrt();
+                self.inverse.extend(self.light.iter().map(|l| inverse * l));
+            }
+            None => {
+                self.condition = f64::INFINITY;
+                self.inverse.resize(self.light.len(), Vector3::zeros());
+            }
+        }
+    }
+}
+
+/// Norm of the 3 x 3 error at the middle, see the head of this file.
+fn mix_error(left: &Node, right: &Node) -> f64 {
+    let mut error = Matrix3::zeros();
+    for i in 0..left.light.len() {
+        error +=
+            (left.inverse[i] - right.inverse[i]) * (right.light[i] - left.light[i]).transpose();
+    }
+    error.norm() / 4.0
+}
+
+/// The power of two at or below the longest component; 1 for a field without a finite non-zero number.
+fn unit_of(field: &FieldRow) -> f64 {
+    let components = field.vectors.iter().flatten();
+    let longest = components
+        .fold(0.0_f64, |longest, c| if c.is_finite() { longest.max(c.abs()) } else { longest });
+    if longest > 0.0 { longest.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
+}

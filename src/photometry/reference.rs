@@ -1,0 +1,257 @@
+//! The plain float64 solution of one photosite, by the book. Every fast path is tested against this one, and photosites
+//! that float32 cannot carry are solved here.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::method::{COPLANAR_CONDITION, MAX_LIGHTS, Method, RELATIVE_FLOOR, REWEIGHTINGS};
+use super::row::{Outcome, RowInput, RowOutput, VarianceModel};
+
+/// One photosite solved, or why not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pixel {
+    /// A surface was found.
+    Fitted(Fit),
+    /// Fewer than three usable samples.
+    TooFewLights {
+        /// Samples that could be used.
+        usable: usize,
+    },
+    /// The usable lights lie in a plane through the photosite.
+    CoplanarLights,
+    /// No light comes back, or the fitted normal points away from the camera.
+    NoSurface,
+}
+
+/// The surface at one photosite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Unit normal, rig frame.
+    pub normal: Vector3<f64>,
+    /// Albedo under the photosite's filter.
+    pub albedo: f64,
+    /// Expected RMS of the total angular error, radians.
+    pub expected_error: f64,
+    /// Root of the residual's mean square over the lights used, in units of y.
+    pub residual: f64,
+    /// What the subset test did.
+    pub outcome: Outcome,
+}
+
+/// The samples of one photosite. All slices have one entry a light.
+#[derive(Clone, Copy)]
+pub struct Samples<'a> {
+    /// Light vectors, rig frame, length = falloff.
+    pub lights: &'a [Vector3<f64>],
+    /// y, see [`RowInput::signal`]; NaN or infinite where unusable.
+    pub y: &'a [f64],
+    /// Variance of y.
+    pub variance: &'a [VarianceModel],
+    /// What the gain maps do to the noise, see [`RowInput::noise_scale`].
+    pub noise_scale: f64,
+}
+
+/// Albedo times normal with the weights that it was solved with.
+#[derive(Clone)]
+pub(crate) struct Solution {
+    pub(crate) g: Vector3<f64>,
+    /// (sum w l l^T)^-1.
+    pub(crate) inverse: Matrix3<f64>,
+    pub(crate) weights: [f64; MAX_LIGHTS],
+}
+
+/// Normal and albedo of one Lambertian photosite.
+///
+/// y_i = g . l_i + noise with g = albedo times normal. Weighted least squares by normal equations; the weights
+/// 1 / var(y) are taken at the fitted value, never at the sample, which would bias dark albedo. Lights whose predicted
+/// signal is not positive stand behind the surface and drop out.
+///
+/// Woodham, "Photometric method for determining surface orientation from multiple images", Optical Engineering 19(1),
+/// 1980; Carroll and Ruppert, "Transformation and Weighting in Regression", 1988, for the reweighting.
+pub fn solve_pixel(samples: &Samples, method: Method) -> Pixel {
+    let usable = samples.usable();
+    let count = usable.iter().filter(|&&u| u).count();
+    if count < 3 {
+        return Pixel::TooFewLights { usable: count };
+    }
+    let Some(start) = samples.solve(samples.equal_weights(&usable)) else {
+        return Pixel::CoplanarLights;
+    };
+    match method {
+        Method::LeastSquares => samples.describe(&start, samples.sandwich(&start), Outcome::Fitted),
+        Method::Weighted | Method::Robust | Method::Auto => {
+            let solution = samples.reweighted(&usable, start);
+            samples.describe(&solution, solution.inverse, Outcome::Fitted)
+        }
+    }
+}
+
+impl Samples<'_> {
+    /// Lights whose sample and vector are finite.
+    fn usable(&self) -> [bool; MAX_LIGHTS] {
+        let mut usable = [false; MAX_LIGHTS];
+        for ((usable, y), light) in usable.iter_mut().zip(self.y).zip(self.lights) {
+            *usable = y.is_finite() && light.iter().all(|c| c.is_finite());
+        }
+        usable
+    }
+
+    fn equal_weights(&self, usable: &[bool; MAX_LIGHTS]) -> [f64; MAX_LIGHTS] {
+        usable.map(|u| if u { 1.0 } else { 0.0 })
+    }
+
+    /// argmin over g of sum w (y - g . l)^2; `None` where the lights that count lie in a plane.
+    pub(crate) fn solve(&self, weights: [f64; MAX_LIGHTS]) -> Option<Solution> {
+        let (mut normal_matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for ((l, &y), &w) in self.lights.iter().zip(self.y).zip(&weights) {
+            if w > 0.0 {
+                normal_matrix += w * l * l.transpose();
+                right += w * y * l;
+            }
+        }
+        let inverse = inverse_if_conditioned(&normal_matrix)?;
+        Some(Solution { g: inverse * right, inverse, weights })
+    }
+
+    /// Repeats the solve with weights from the fit before.
+    fn reweighted(&self, usable: &[bool; MAX_LIGHTS], start: Solution) -> Solution {
+        let mut solution = start;
+        for _ in 0..REWEIGHTINGS {
+            let lit = self.weights_at(&solution.g, usable, true);
+            solution = match self
+                .solve(lit)
+                .or_else(|| self.solve(self.weights_at(&solution.g, usable, false)))
+            {
+                Some(next) => next,
+                None => break,
+            };
+        }
+        solution
+    }
+
+    /// 1 / var at the value that `g` predicts; zero for unusable samples and, if `lit_only`, for lights behind the surface.
+    pub(crate) fn weights_at(
+        &self,
+        g: &Vector3<f64>,
+        usable: &[bool; MAX_LIGHTS],
+        lit_only: bool,
+    ) -> [f64; MAX_LIGHTS] {
+        let least = (RELATIVE_FLOOR * self.level(usable)).powi(2).max(f64::MIN_POSITIVE);
+        let mut weights = [0.0; MAX_LIGHTS];
+        for (i, l) in self.lights.iter().enumerate().filter(|&(i, _)| usable[i]) {
+            let predicted = g.dot(l);
+            if predicted > 0.0 || !lit_only {
+                weights[i] =
+                    1.0 / variance(&self.variance[i], predicted, self.noise_scale).max(least);
+            }
+        }
+        weights
+    }
+
+    /// The brightest usable sample.
+    fn level(&self, usable: &[bool; MAX_LIGHTS]) -> f64 {
+        let values = self.y.iter().zip(usable).filter(|(_, usable)| **usable);
+        values.fold(0.0, |level, (y, _)| level.max(y.abs()))
+    }
+
+    fn describe(&self, solution: &Solution, covariance: Matrix3<f64>, outcome: Outcome) -> Pixel {
+        let albedo = solution.g.norm();
+        if !(albedo > 0.0 && albedo.is_finite() && solution.g.z > 0.0) {
+            return Pixel::NoSurface;
+        }
+        let normal = solution.g / albedo;
+        let across_normal = covariance.trace() - normal.dot(&(covariance * normal));
+        let expected_error = across_normal.max(0.0).sqrt() / albedo;
+        let residual = self.residual(solution);
+        Pixel::Fitted(Fit { normal, albedo, expected_error, residual, outcome })
+    }
+
+    /// Covariance of a plain solution: P V P^T with P = (sum l l^T)^-1 [l]. Where w = 1 / var it is the inverse itself.
+    fn sandwich(&self, solution: &Solution) -> Matrix3<f64> {
+        let mut covariance = Matrix3::zeros();
+        for (i, l) in self.lights.iter().enumerate().filter(|&(i, _)| solution.weights[i] > 0.0) {
+            let column = solution.inverse * l;
+            let noise = variance(&self.variance[i], solution.g.dot(l), self.noise_scale);
+            covariance += noise * column * column.transpose();
+        }
+        covariance
+    }
+
+    fn residual(&self, solution: &Solution) -> f64 {
+        let (mut squares, mut count) = (0.0, 0.0);
+        for ((l, y), w) in self.lights.iter().zip(self.y).zip(&solution.weights) {
+            if *w > 0.0 {
+                squares += (y - solution.g.dot(l)).powi(2);
+                count += 1.0;
+            }
+        }
+        (squares / f64::max(count, 1.0)).sqrt()
+    }
+}
+
+/// var(y) at a predicted value; terms that are not finite or negative count as zero.
+pub(crate) fn variance(model: &VarianceModel, predicted: f64, noise_scale: f64) -> f64 {
+    let term = |t: f32| if t.is_finite() { f64::from(t.max(0.0)) } else { 0.0 };
+    let scale = if noise_scale.is_finite() && noise_scale > 0.0 { noise_scale } else { 1.0 };
+    let predicted = predicted.max(0.0);
+    term(model.shot) * scale * predicted
+        + term(model.floor) * scale * scale
+        + (term(model.kappa) * predicted).powi(2)
+}
+
+/// Inverse of a symmetric positive matrix; `None` where its condition (that of the light vectors squared) is too large.
+pub(crate) fn inverse_if_conditioned(matrix: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let scale = matrix.trace();
+    if !(scale > f64::MIN_POSITIVE && scale.is_finite()) {
+        return None;
+    }
+    let inverse = (matrix / scale).cholesky()?.inverse();
+    let condition_squared = inverse.trace();
+    (condition_squared < COPLANAR_CONDITION.powi(2)).then(|| inverse / scale)
+}
+
+/// Solves a row photosite by photosite, with the light vectors interpolated to each column. What the row's kernels are
+/// measured against.
+pub fn reference_row(input: &RowInput, output: &mut RowOutput, method: Method) {
+    for column in 0..output.outcome.len() {
+        let pixel = solve_column(input, column, method);
+        output.write(column, &pixel);
+    }
+}
+
+/// One photosite of a row.
+pub(crate) fn solve_column(input: &RowInput, column: usize, method: Method) -> Pixel {
+    let n = input.field.lights.min(MAX_LIGHTS);
+    let mut lights = [Vector3::zeros(); MAX_LIGHTS];
+    let mut y = [f64::NAN; MAX_LIGHTS];
+    let mut variance = [VarianceModel::default(); MAX_LIGHTS];
+    for i in 0..n {
+        lights[i] = input.field.at(column, i);
+        y[i] = f64::from(input.signal[i][column]);
+        variance[i] = input.variance[i][column & 1];
+    }
+    let noise_scale = input.noise_scale.map_or(1.0, |scale| f64::from(scale[column]));
+    let samples =
+        Samples { lights: &lights[..n], y: &y[..n], variance: &variance[..n], noise_scale };
+    solve_pixel(&samples, method)
+}
+
+impl RowOutput<'_> {
+    /// Writes one photosite.
+    pub(crate) fn write(&mut self, column: usize, pixel: &Pixel) {
+        let fit = match pixel {
+            Pixel::Fitted(fit) => fit,
+            Pixel::TooFewLights { .. } => return self.clear(column, Outcome::TooFewLights),
+            Pixel::CoplanarLights => return self.clear(column, Outcome::CoplanarLights),
+            Pixel::NoSurface => return self.clear(column, Outcome::NoSurface),
+        };
+        self.normal[column] = [fit.normal.x as f32, fit.normal.y as f32, fit.normal.z as f32];
+        self.albedo[column] = fit.albedo.min(f64::from(f32::MAX)) as f32;
+        self.expected_error_deg[column] =
+            fit.expected_error.to_degrees().min(MOST_ERROR_DEG) as f32;
+        self.residual[column] = fit.residual.min(f64::from(f32::MAX)) as f32;
+        self.outcome[column] = fit.outcome;
+    }
+}
+
+/// An expected error beyond this says only that nothing is known.
+pub(crate) const MOST_ERROR_DEG: f64 = 90.0;

@@ -1,0 +1,72 @@
+//! What a block's solve found, and how it is written to the row.
+
+use super::block::{Block, LANES, Lanes, ZERO};
+use super::reference::MOST_ERROR_DEG;
+use super::row::{Outcome, RowOutput};
+
+/// Albedo times normal of a block, with what is known about it. Light vectors are in units of `Pieces::unit`.
+pub(crate) struct Surface {
+    pub(crate) g: [Lanes; 3],
+    /// Trace of the covariance of g across the normal.
+    pub(crate) tangent_variance: Lanes,
+    /// Sum of squared residuals over the lights used, and how many these are.
+    pub(crate) squares: Lanes,
+    pub(crate) count: Lanes,
+    /// `false` where a photosite needs another path: samples missing, lights too badly conditioned for float32.
+    pub(crate) carried: [bool; LANES],
+}
+
+/// |g|^2 outside this range may have lost bits to underflow or overflow: float64 takes over.
+const COMFORTABLE: std::ops::Range<f32> = 1e-24..1e24;
+
+impl Surface {
+    /// Unit normal (0 where there is none), albedo in the block's units.
+    #[inline(always)]
+    pub(crate) fn normal_and_albedo(&self) -> ([Lanes; 3], Lanes) {
+        let [x, y, z] = &self.g;
+        let (mut normal, mut albedo) = ([ZERO; 3], ZERO);
+        for k in 0..LANES {
+            let square = x[k] * x[k] + y[k] * y[k] + z[k] * z[k];
+            let length = square.sqrt();
+            albedo[k] = length;
+            let scale = if COMFORTABLE.contains(&square) { 1.0 / length } else { 0.0 };
+            normal[0][k] = x[k] * scale;
+            normal[1][k] = y[k] * scale;
+            normal[2][k] = z[k] * scale;
+        }
+        (normal, albedo)
+    }
+
+    /// Writes the block's photosites and hands the lanes that float32 cannot carry to `refused`.
+    #[inline(always)]
+    pub(crate) fn write(
+        &self,
+        block: &Block,
+        unit: f64,
+        output: &mut RowOutput,
+        mut refused: impl FnMut(usize, &mut RowOutput),
+    ) {
+        let (normal, albedo) = self.normal_and_albedo();
+        let (mut error_deg, mut residual) = (ZERO, ZERO);
+        for k in 0..LANES {
+            let relative = self.tangent_variance[k].max(0.0).sqrt() / albedo[k];
+            error_deg[k] = (relative * (180.0 / std::f32::consts::PI)).min(MOST_ERROR_DEG as f32);
+            residual[k] = (self.squares[k].max(0.0) / self.count[k].max(1.0)).sqrt();
+        }
+        let per_unit = (1.0 / unit) as f32;
+        for k in 0..block.len {
+            let column = block.column[k];
+            if !(self.carried[k] && COMFORTABLE.contains(&(albedo[k] * albedo[k]))) {
+                refused(k, output);
+            } else if normal[2][k] > 0.0 {
+                output.normal[column] = [normal[0][k], normal[1][k], normal[2][k]];
+                output.albedo[column] = albedo[k] * per_unit;
+                output.expected_error_deg[column] = error_deg[k];
+                output.residual[column] = residual[k];
+                output.outcome[column] = Outcome::Fitted;
+            } else {
+                output.clear(column, Outcome::NoSurface);
+            }
+        }
+    }
+}

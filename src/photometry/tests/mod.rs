@@ -1,0 +1,4 @@
+//! What the kernels must do, on rows that a small forward model makes.
+
+mod agreement;
+pub(super) mod scene;
