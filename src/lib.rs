@@ -17,3 +17,4 @@ pub mod instrument;
 pub mod photometry;
 pub mod raw;
 pub mod session;
+pub mod solution;

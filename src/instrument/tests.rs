@@ -309,7 +309,7 @@ fn impossible_cameras_are_told() {
 #[test]
 fn impossible_colours_are_told() {
     let check = |keys: &str, expected: &str| {
-        check_file(COLOR_FILE, &format!("schema = 1\n{keys}\n"), expected)
+        check_file(COLOR_FILE, &format!("schema = 1\n{keys}\n"), expected);
     };
     check("", "fine");
     check("response = [0, 1]", "fine");

@@ -1,0 +1,68 @@
+//! The folder that a solve writes: names of its files, and `report.json`.
+
+mod report;
+
+pub use report::{PlaneReport, Report};
+
+use crate::files::{FileError, OutputKind};
+use std::path::{Path, PathBuf};
+
+/// Normals, rig frame: 32-bit float, channels R, G, B = nx, ny, nz; 0 where unsolved.
+pub const NORMAL_EXR: &str = "normal.exr";
+/// Albedo, linear RGB, float; 0 where unsolved.
+pub const ALBEDO_EXR: &str = "albedo.exr";
+/// Expected RMS of the normal's total angular error, degrees, channel Y; 0 where unsolved.
+pub const CONFIDENCE_EXR: &str = "confidence.exr";
+/// Normals for looking and for engines, 16 bit.
+pub const NORMAL_PNG: &str = "normal.png";
+/// Albedo, 16 bit, sRGB-encoded.
+pub const ALBEDO_PNG: &str = "albedo.png";
+/// 255 = solved.
+pub const MASK_PNG: &str = "mask.png";
+/// What the solve says of itself.
+pub const REPORT_JSON: &str = "report.json";
+/// The page that a person looks at.
+pub const REPORT_HTML: &str = "report.html";
+/// The calibration's camera, copied.
+pub const CAMERA_TOML: &str = crate::instrument::CAMERA_FILE;
+
+/// A solution as an output folder: an earlier one may be replaced if it holds nothing else.
+pub const OUTPUT: OutputKind = OutputKind {
+    name: "solution",
+    marker: Some(REPORT_JSON),
+    members: &[
+        NORMAL_EXR,
+        ALBEDO_EXR,
+        CONFIDENCE_EXR,
+        NORMAL_PNG,
+        ALBEDO_PNG,
+        MASK_PNG,
+        REPORT_JSON,
+        REPORT_HTML,
+        CAMERA_TOML,
+    ],
+};
+
+/// A solution on disk.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The folder.
+    pub folder: PathBuf,
+    /// Its `report.json`.
+    pub report: Report,
+}
+
+impl Solution {
+    /// Reads a solution's report; the maps are read by whoever needs them.
+    ///
+    /// # Errors
+    /// Where there is no report, or it is of another schema or broken.
+    pub fn load(folder: &Path) -> Result<Self, FileError> {
+        Ok(Self { folder: folder.to_owned(), report: Report::read(&folder.join(REPORT_JSON))? })
+    }
+
+    /// Where one of its files is.
+    pub fn path(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+}

@@ -1,0 +1,164 @@
+use crate::files::{FileError, Input, SCHEMA, write_atomic};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// `report.json`: what a solve says of itself. Keys that this version does not know are passed over.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// Version of this format.
+    pub schema: i64,
+    /// Program and version, as in "weavelight 0.1.0".
+    #[serde(default)]
+    pub program: String,
+    /// "auto", "least-squares" or "robust".
+    #[serde(default)]
+    pub method: String,
+    /// Width and height of the maps.
+    #[serde(default)]
+    pub size_px: [usize; 2],
+    /// Indices, ascending.
+    pub lights_used: Vec<usize>,
+    /// Photosites of a frame.
+    pub pixels: u64,
+    /// Those with a normal.
+    pub solved: u64,
+    /// Those that took the robust path.
+    pub robust_pixels: u64,
+    /// Those with at least one clipped sample.
+    pub saturated_pixels: u64,
+    /// Photosites by what became of them, as in "too_few_lights".
+    #[serde(default)]
+    pub outcomes: BTreeMap<String, u64>,
+    /// Root mean square of the fit's residual over the solved photosites, in units of albedo.
+    pub residual_rms: Option<f64>,
+    /// Seconds per stage.
+    pub seconds: BTreeMap<String, f64>,
+    /// Size of a pixel on the plane at the picture's centre; `None` without a camera.
+    pub mm_per_px: Option<f64>,
+    /// Whether the lens distortion was taken out of the maps.
+    pub undistorted: bool,
+    /// The surface assumed, rig frame.
+    pub plane: PlaneReport,
+    /// What the albedo's R, G, B are: "linear sRGB" or "white-balanced camera RGB".
+    pub color_space: String,
+    /// Sentences; the same go to standard error.
+    pub warnings: Vec<String>,
+    /// The capture session's manifest and the calibration's files, with their hashes.
+    pub inputs: Vec<Input>,
+    /// Hash of inputs and settings together: the same key means the same solution.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<String>,
+}
+
+/// A plane in `report.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlaneReport {
+    /// A point on it, rig frame.
+    pub point_mm: [f64; 3],
+    /// Its unit normal, rig frame.
+    pub normal: [f64; 3],
+}
+
+impl Report {
+    /// Reads `report.json`.
+    ///
+    /// # Errors
+    /// Where it cannot be read, or is of another schema or broken; with file, line and remedy.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| FileError::read(path, source))?;
+        let broken = |error: serde_json::Error| FileError::Invalid {
+            path: path.to_owned(),
+            line: error.line().max(1),
+            what: format!("{error}; run `weavelight solve` again"),
+        };
+        let value: serde_json::Value = serde_json::from_str(&text).map_err(broken)?;
+        if let Some(found) =
+            value.get("schema").and_then(serde_json::Value::as_i64).filter(|found| *found != SCHEMA)
+        {
+            return Err(FileError::Schema {
+                path: path.to_owned(),
+                line: 1,
+                found,
+                supported: SCHEMA,
+            });
+        }
+        serde_json::from_str(&text).map_err(broken)
+    }
+
+    /// Writes `report.json`, whole or not at all.
+    ///
+    /// # Errors
+    /// Where it cannot be written, or holds numbers that JSON cannot.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let unwritable = |what: String| FileError::Unwritable { path: path.to_owned(), what };
+        if !self.is_finite() {
+            return Err(unwritable("a figure is not a finite number".to_owned()));
+        }
+        let mut text =
+            serde_json::to_string_pretty(self).map_err(|error| unwritable(error.to_string()))?;
+        text.push('\n');
+        write_atomic(path, text.as_bytes())
+    }
+
+    fn is_finite(&self) -> bool {
+        let plane = self.plane.point_mm.iter().chain(&self.plane.normal);
+        let figures = self.residual_rms.iter().chain(&self.mm_per_px).chain(self.seconds.values());
+        plane.chain(figures).all(|number| number.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report() -> Report {
+        Report {
+            schema: SCHEMA,
+            program: "weavelight 0.1.0".into(),
+            method: "auto".into(),
+            size_px: [2, 3],
+            lights_used: vec![0, 2, 3],
+            pixels: 6,
+            solved: 5,
+            robust_pixels: 1,
+            saturated_pixels: 0,
+            outcomes: [("masked".to_owned(), 1)].into(),
+            residual_rms: Some(1.0 / 3.0),
+            seconds: [("decode".to_owned(), 0.25)].into(),
+            mm_per_px: None,
+            undistorted: false,
+            plane: PlaneReport { point_mm: [0.0, 0.0, 5.0], normal: [0.0, 0.0, 1.0] },
+            color_space: "linear sRGB".into(),
+            warnings: vec!["light 1 has no frame".into()],
+            inputs: vec![Input { name: "session.toml".into(), sha256: "ab".into() }],
+            key: None,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_what_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("report.json");
+        report().write(&path).unwrap();
+        assert_eq!(Report::read(&path).unwrap(), report());
+        let unfinished = Report { residual_rms: Some(f64::NAN), ..report() };
+        assert!(unfinished.write(&path).unwrap_err().to_string().contains("not a finite number"));
+        assert_eq!(Report::read(&path).unwrap(), report());
+    }
+
+    #[test]
+    fn broken_reports_are_told() {
+        let check = |text: &str, expected: &str| {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("report.json");
+            std::fs::write(&path, text).unwrap();
+            let error = Report::read(&path).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        };
+        check("{\"schema\": 9}", "report.json:1: schema 9, but this version reads schema 1");
+        check("{\"schema\": 1,\n \"pixels\": }", "report.json:2: expected value");
+        check("{\"schema\": 1}", "missing field `lights_used`");
+        check("", "report.json:1: EOF");
+    }
+}
