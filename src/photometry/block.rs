@@ -142,6 +142,12 @@ impl Block {
         self.sample.iter().filter(|sample| sample.usable[k] > 0.0).count()
     }
 
+    /// Bit i is set if light i had a weight in the latest solve of lane `k`.
+    pub(crate) fn kept(&self, k: usize) -> u64 {
+        let lights = self.sample.iter().enumerate();
+        lights.filter(|(_, sample)| sample.weight[k] > 0.0).fold(0, |kept, (i, _)| kept | 1 << i)
+    }
+
     /// Whether no photosite has any signal.
     pub(crate) fn is_dark(&self) -> bool {
         self.level.iter().all(|&level| level == 0.0)

@@ -35,6 +35,8 @@ pub struct Fit {
     pub residual: f64,
     /// What the subset test did.
     pub outcome: Outcome,
+    /// Bit i is set if the sample of light i took part.
+    pub kept: u64,
 }
 
 /// The samples of one photosite. All slices have one entry a light.
@@ -57,6 +59,13 @@ pub(crate) struct Solution {
     /// (sum w l l^T)^-1.
     pub(crate) inverse: Matrix3<f64>,
     pub(crate) weights: [f64; MAX_LIGHTS],
+}
+
+impl Solution {
+    fn kept(&self) -> u64 {
+        let lights = self.weights.iter().enumerate();
+        lights.filter(|(_, w)| **w > 0.0).fold(0, |kept, (i, _)| kept | 1 << i)
+    }
 }
 
 /// Normal and albedo of one Lambertian photosite.
@@ -162,7 +171,14 @@ impl Samples<'_> {
         let across_normal = covariance.trace() - normal.dot(&(covariance * normal));
         let expected_error = across_normal.max(0.0).sqrt() / albedo;
         let residual = self.residual(solution);
-        Pixel::Fitted(Fit { normal, albedo, expected_error, residual, outcome })
+        Pixel::Fitted(Fit {
+            normal,
+            albedo,
+            expected_error,
+            residual,
+            outcome,
+            kept: solution.kept(),
+        })
     }
 
     /// Covariance of a plain solution: P V P^T with P = (sum l l^T)^-1 [l]. Where w = 1 / var it is the inverse itself.
@@ -250,6 +266,7 @@ impl RowOutput<'_> {
             fit.expected_error.to_degrees().min(MOST_ERROR_DEG) as f32;
         self.residual[column] = fit.residual.min(f64::from(f32::MAX)) as f32;
         self.outcome[column] = fit.outcome;
+        self.keep(column, fit.kept);
     }
 }
 

@@ -96,6 +96,14 @@ impl RowOutput<'_> {
         self.expected_error_deg[column] = 0.0;
         self.residual[column] = 0.0;
         self.outcome[column] = outcome;
+        self.keep(column, 0);
+    }
+
+    /// Notes which samples a fit rests on.
+    pub(crate) fn keep(&mut self, column: usize, lights: u64) {
+        if let Some(kept) = &mut self.kept {
+            kept[column] = lights;
+        }
     }
 }
 
@@ -163,6 +171,9 @@ pub(crate) fn check_shapes(input: &RowInput, output: &RowOutput) -> Result<(), R
     same("albedo", output.albedo.len(), width)?;
     same("expected error", output.expected_error_deg.len(), width)?;
     same("residual", output.residual.len(), width)?;
+    if let Some(kept) = &output.kept {
+        same("kept lights", kept.len(), width)?;
+    }
     let nodes = if width == 0 { 0 } else { (width - 1).div_ceil(input.field.step.max(1)) + 1 };
     same("light field", input.field.vectors.len(), nodes.max(input.field.nodes()) * lights)
 }

@@ -56,7 +56,7 @@ impl RowSolver {
             match method {
                 _ if !piece.float32 => self.queues.deferred.extend(piece.start..piece.end),
                 Method::LeastSquares => {
-                    self.neighbours(index, input, output, least_squares_of_block)
+                    self.neighbours(index, input, output, least_squares_of_block);
                 }
                 Method::Weighted | Method::Robust | Method::Auto => {
                     self.neighbours(index, input, output, weighted_of_block);

@@ -64,6 +64,9 @@ impl Surface {
                 output.expected_error_deg[column] = error_deg[k];
                 output.residual[column] = residual[k];
                 output.outcome[column] = Outcome::Fitted;
+                if output.kept.is_some() {
+                    output.keep(column, block.kept(k));
+                }
             } else {
                 output.clear(column, Outcome::NoSurface);
             }

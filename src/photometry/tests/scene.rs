@@ -102,7 +102,8 @@ impl Scene {
         step: usize,
         mut facet: impl FnMut(usize) -> (Vector3<f64>, f64),
     ) -> Self {
-        let field = near_field(positions_mm, width, step, 0.085);
+        let pitch_mm = 0.085_f64.min(300.0 / width as f64); // rows of many samples stay on the table
+        let field = near_field(positions_mm, width, step, pitch_mm);
         let lights = positions_mm.len();
         let (normal, albedo): (Vec<_>, Vec<_>) = (0..width).map(&mut facet).unzip();
         let mut scene = Self {
@@ -174,6 +175,7 @@ pub(crate) struct Solved {
     pub(crate) expected_error_deg: Vec<f32>,
     pub(crate) residual: Vec<f32>,
     pub(crate) outcome: Vec<Outcome>,
+    pub(crate) kept: Vec<u64>,
 }
 
 impl Solved {
@@ -184,6 +186,7 @@ impl Solved {
             expected_error_deg: vec![f32::NAN; width],
             residual: vec![f32::NAN; width],
             outcome: vec![Outcome::Masked; width],
+            kept: vec![u64::MAX; width],
         }
     }
 
@@ -194,6 +197,7 @@ impl Solved {
             expected_error_deg: &mut self.expected_error_deg,
             residual: &mut self.residual,
             outcome: &mut self.outcome,
+            kept: Some(&mut self.kept),
         }
     }
 
