@@ -15,6 +15,7 @@
 pub mod files;
 pub mod instrument;
 pub mod photometry;
+pub mod raster;
 pub mod raw;
 pub mod session;
 pub mod solution;

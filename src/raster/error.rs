@@ -1,0 +1,98 @@
+use std::path::PathBuf;
+
+/// Why bytes are no usable picture. The message says what is wrong and what to do; whoever knows the path adds it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PictureError {
+    /// No bytes at all.
+    #[error("the file is empty; copy it again from where it came")]
+    Empty,
+    /// Something else under a picture's name.
+    #[error("this is {found}, not a picture; give {expected}")]
+    NotAPicture {
+        /// As in "a text file".
+        found: &'static str,
+        /// As in "a PNG file".
+        expected: &'static str,
+    },
+    /// Data that the file announces lies beyond its end.
+    #[error(
+        "the file is cut short: {what} reaches to byte {needed}, the file has {have}; copy it again from where it came"
+    )]
+    Truncated {
+        /// As in "strip 3".
+        what: String,
+        /// Bytes the file would need.
+        needed: u64,
+        /// Bytes there are.
+        have: u64,
+    },
+    /// The content contradicts itself.
+    #[error("the file is damaged: {what}; copy it again from where it came")]
+    Damaged {
+        /// What contradicts.
+        what: String,
+    },
+    /// A sound file of a kind that is not read.
+    #[error("{what} cannot be read; {remedy}")]
+    Unsupported {
+        /// As in "a palette TIFF".
+        what: String,
+        /// What to do, as in "convert it to DNG".
+        remedy: &'static str,
+    },
+    /// Dimensions that no file of this length can fill.
+    #[error(
+        "the file claims {width} x {height} pixels, more than its {bytes} bytes can hold; copy it again from where it came"
+    )]
+    TooLarge {
+        /// Claimed.
+        width: u64,
+        /// Claimed.
+        height: u64,
+        /// Length of the file.
+        bytes: u64,
+    },
+}
+
+impl PictureError {
+    pub(crate) fn damaged(what: impl Into<String>) -> Self {
+        // Libraries' messages may run over several lines.
+        let what: String = what.into();
+        Self::Damaged {
+            what: what.lines().next().unwrap_or_default().trim_end_matches('.').to_owned(),
+        }
+    }
+
+    pub(crate) fn unsupported(what: impl Into<String>, remedy: &'static str) -> Self {
+        Self::Unsupported { what: what.into(), remedy }
+    }
+}
+
+/// A picture file that could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// Missing, or not readable.
+    #[error("{}: {source}; check the name and the permissions", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// No space, or not allowed.
+    #[error("{}: {source}; check the free space and the permissions of the folder", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The content is no usable picture.
+    #[error("{}: {source}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: PictureError,
+    },
+}

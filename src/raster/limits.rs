@@ -1,0 +1,29 @@
+//! How large a picture a file may claim to hold. Decoders allocate by what the file claims, so this comes first.
+
+use super::PictureError;
+
+/// More samples than any camera of the next years; 800 MB of u16.
+const MOST_SAMPLES: u64 = 400_000_000;
+
+/// Samples that one byte of a file can stand for. Deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes from two
+/// bits), LZW about 1400; a flat JPEG block of 64 samples takes six bits or more.
+const MOST_SAMPLES_PER_BYTE: u64 = 1_500;
+
+/// # Errors
+/// No pixels at all, or more than the file's length can hold.
+pub(crate) fn check(
+    width: u64,
+    height: u64,
+    channels: usize,
+    bytes: usize,
+) -> Result<(), PictureError> {
+    if width == 0 || height == 0 {
+        return Err(PictureError::damaged(format!("it claims {width} x {height} pixels")));
+    }
+    let samples = width.saturating_mul(height).saturating_mul(channels as u64);
+    let bytes = bytes as u64;
+    if samples > MOST_SAMPLES || samples > bytes.saturating_mul(MOST_SAMPLES_PER_BYTE) {
+        return Err(PictureError::TooLarge { width, height, bytes });
+    }
+    Ok(())
+}

@@ -1,0 +1,73 @@
+use crate::raster::PictureError;
+use std::path::PathBuf;
+
+/// Why bytes are no usable frame. The message says what is wrong and what to do; whoever knows the path adds it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DecodeError {
+    /// No usable picture at all.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// 8-bit pictures encode light in either of two ways.
+    #[error(
+        "an 8-bit picture does not say how it encodes light; declare encoding = \"linear\" or \"srgb\""
+    )]
+    EncodingUndeclared,
+    /// A declared encoding that the format excludes.
+    #[error("{format} holds linear values; remove encoding = \"srgb\"")]
+    EncodingContradicted {
+        /// As in "a RAW file".
+        format: &'static str,
+    },
+    /// A declared mosaic that the file contradicts.
+    #[error("cfa = \"{declared}\" is declared, but the file holds {found}; remove or correct cfa")]
+    CfaContradicted {
+        /// From the hint.
+        declared: String,
+        /// From the file.
+        found: String,
+    },
+}
+
+impl DecodeError {
+    pub(crate) fn damaged(what: impl Into<String>) -> Self {
+        PictureError::damaged(what).into()
+    }
+
+    pub(crate) fn unsupported(what: impl Into<String>, remedy: &'static str) -> Self {
+        PictureError::unsupported(what, remedy).into()
+    }
+}
+
+/// What to do with a RAW file of an unusual kind.
+pub(crate) const CONVERT_TO_DNG: &str = "convert it to an uncompressed DNG";
+
+/// Why a frame's file gave no frame.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file is missing or cannot be read.
+    #[error("{}: {source}; check the name in session.toml and the permissions", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The file is not the one that was captured.
+    #[error("{}: altered since it was captured (SHA-256 {found}..., recorded {expected}...); restore the original", path.display())]
+    Altered {
+        /// The file.
+        path: PathBuf,
+        /// First digits of the hash in the manifest.
+        expected: String,
+        /// First digits of the file's hash.
+        found: String,
+    },
+    /// The file is there but is no usable frame.
+    #[error("{}: {source}", path.display())]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: DecodeError,
+    },
+}

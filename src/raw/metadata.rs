@@ -1,0 +1,69 @@
+//! What a file says of the camera.
+
+use super::Metadata;
+use super::tags::{Directory, Tiff, tag};
+use std::io::Cursor;
+
+/// From the directories of a RAW file or TIFF.
+pub(crate) fn from_tiff(tiff: &Tiff) -> Metadata {
+    let positive = |tag| tiff.with(tag).and_then(|directory| directory.positive(tag));
+    let text = |tag| tiff.with(tag).and_then(|directory| directory.text(tag));
+    Metadata {
+        camera: camera_name(text(tag::MAKE), text(tag::MODEL)),
+        exposure_s: positive(tag::EXPOSURE_TIME),
+        // Above 65535 the old tag is full and the newer one says the number.
+        iso: positive(tag::ISO)
+            .filter(|&iso| iso < 65_535.0)
+            .or_else(|| positive(tag::RECOMMENDED_EXPOSURE_INDEX)),
+        focal_length_mm: positive(tag::FOCAL_LENGTH),
+        camera_from_xyz: color_matrix(tiff),
+        orientation: tiff.directories[0]
+            .integer(tag::ORIENTATION)
+            .and_then(|value| value.try_into().ok()),
+    }
+}
+
+/// "NIKON CORPORATION" and "NIKON D5100" make "NIKON D5100"; "Canon" and "EOS 5D" make "Canon EOS 5D".
+fn camera_name(make: Option<String>, model: Option<String>) -> Option<String> {
+    let (Some(make), Some(model)) = (make.clone(), model.clone()) else { return model.or(make) };
+    let maker = make.split_whitespace().next().unwrap_or_default().to_lowercase();
+    if model.to_lowercase().starts_with(&maker) {
+        Some(model)
+    } else {
+        Some(format!("{make} {model}"))
+    }
+}
+
+/// DNG's matrix for D65 (illuminant 21), else the second, else the first.
+fn color_matrix(tiff: &Tiff) -> Option<[[f64; 3]; 3]> {
+    let first = tiff.with(tag::COLOR_MATRIX_1)?;
+    let illuminant = |tag| first.integer(tag);
+    let tag = if illuminant(tag::ILLUMINANT_1) == Some(21) || !first.has(tag::COLOR_MATRIX_2) {
+        tag::COLOR_MATRIX_1
+    } else {
+        tag::COLOR_MATRIX_2
+    };
+    matrix(first, tag)
+}
+
+fn matrix(directory: &Directory, tag: u16) -> Option<[[f64; 3]; 3]> {
+    let numbers: [f64; 9] = directory.numbers(tag)?.try_into().ok()?;
+    let [a, b, c, d, e, f, g, h, i] = numbers;
+    numbers.iter().all(|value| value.is_finite()).then_some([[a, b, c], [d, e, f], [g, h, i]])
+}
+
+/// From the Exif block of a PNG or JPEG, as far as there is one.
+pub(crate) fn from_exif_container(bytes: &[u8]) -> Metadata {
+    let mut reader = exif::Reader::new();
+    reader.continue_on_error(true);
+    let exif = match reader.read_from_container(&mut Cursor::new(bytes)) {
+        Ok(exif) => exif,
+        Err(exif::Error::PartialResult(partial)) => partial.into_inner().0,
+        Err(_) => return Metadata::default(),
+    };
+    from_tiff_bytes(exif.buf())
+}
+
+fn from_tiff_bytes(bytes: &[u8]) -> Metadata {
+    Tiff::parse(bytes).map_or_else(|_| Metadata::default(), |tiff| from_tiff(&tiff))
+}

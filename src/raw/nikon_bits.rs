@@ -1,0 +1,192 @@
+//! The Huffman code of Nikon's compressed NEF.
+
+/// Longest code of any of the trees, bits.
+const LONGEST_CODE: u32 = 11;
+
+/// A code: for every possible next [`LONGEST_CODE`] bits, which symbol they begin with.
+#[derive(Debug)]
+pub(crate) struct Tree {
+    /// Length of the code and its symbol. The symbol's low half is the number of bits of the difference, its high half how many
+    /// of those, the lowest, are left out.
+    table: Vec<[u8; 2]>,
+}
+
+impl Tree {
+    pub(crate) fn lossless(bits: u32) -> Self {
+        match bits {
+            12 => Self::new(&[0, 1, 4, 2, 3, 1, 2], &[5, 4, 6, 3, 7, 2, 8, 1, 9, 0, 10, 11, 12]),
+            _ => Self::new(
+                &[0, 1, 4, 2, 2, 3, 1, 2],
+                &[7, 6, 8, 5, 9, 4, 10, 3, 11, 12, 2, 0, 1, 13, 14],
+            ),
+        }
+    }
+
+    pub(crate) fn lossy(bits: u32) -> Self {
+        match bits {
+            12 => Self::new(
+                &[0, 1, 5, 1, 1, 1, 1, 1, 1, 2],
+                &[5, 4, 3, 6, 2, 7, 1, 0, 8, 9, 11, 10, 12, 0],
+            ),
+            _ => Self::new(
+                &[0, 1, 4, 3, 1, 1, 1, 1, 1, 2],
+                &[5, 6, 4, 7, 8, 3, 9, 2, 1, 0, 10, 11, 12, 13, 14],
+            ),
+        }
+    }
+
+    pub(crate) fn lossy_after_split(bits: u32) -> Self {
+        match bits {
+            12 => Self::new(
+                &[0, 1, 5, 1, 1, 1, 1, 1, 1, 2],
+                &[0x39, 0x5a, 0x38, 0x27, 0x16, 5, 4, 3, 2, 1, 0, 11, 12, 12],
+            ),
+            _ => Self::new(
+                &[0, 1, 5, 1, 1, 1, 1, 1, 1, 1, 2],
+                &[8, 0x5c, 0x4b, 0x3a, 0x29, 7, 6, 5, 4, 3, 2, 1, 0, 13, 14],
+            ),
+        }
+    }
+
+    /// A canonical code: `counts[i]` codes of length `i + 1`, and the symbols in the order of their codes.
+    fn new(counts: &[usize], symbols: &[u8]) -> Self {
+        let mut table = Vec::with_capacity(1 << LONGEST_CODE);
+        let lengths =
+            (1..).zip(counts).flat_map(|(length, &count)| std::iter::repeat_n(length, count));
+        for (length, &symbol) in lengths.zip(symbols) {
+            table.extend(std::iter::repeat_n(
+                [length, symbol],
+                1 << (LONGEST_CODE - u32::from(length)),
+            ));
+        }
+        table.resize(1 << LONGEST_CODE, [LONGEST_CODE as u8, 0]);
+        Self { table }
+    }
+}
+
+/// Reads differences from a stream of bits, most significant first.
+#[derive(Debug)]
+pub(crate) struct Differences<'a> {
+    bytes: &'a [u8],
+    /// Next byte to load; counts on beyond the end, where zeros follow.
+    next: usize,
+    /// Loaded bits, from the top.
+    buffer: u64,
+    /// How many of them are loaded.
+    held: u32,
+}
+
+impl<'a> Differences<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, next: 0, buffer: 0, held: 0 }
+    }
+
+    /// True when bits beyond the end have been used.
+    pub(crate) fn overrun(&self) -> bool {
+        self.next * 8 > self.bytes.len() * 8 + self.held as usize
+    }
+
+    /// At least 56 bits are held afterwards.
+    #[inline]
+    fn fill(&mut self) {
+        match self.bytes.get(self.next..).and_then(<[u8]>::first_chunk) {
+            Some(&eight) => {
+                self.buffer |= u64::from_be_bytes(eight) >> self.held;
+                self.next += (63 - self.held as usize) / 8;
+                self.held |= 56;
+            }
+            None => self.fill_near_end(),
+        }
+    }
+
+    #[cold]
+    fn fill_near_end(&mut self) {
+        while self.held <= 56 {
+            let byte = self.bytes.get(self.next).copied().unwrap_or(0);
+            self.buffer |= u64::from(byte) << (56 - self.held);
+            self.next += 1;
+            self.held += 8;
+        }
+    }
+
+    #[inline]
+    fn skip(&mut self, bits: u32) {
+        self.buffer <<= bits;
+        self.held -= bits;
+    }
+
+    /// The next difference.
+    #[inline]
+    pub(crate) fn next(&mut self, tree: &Tree) -> i32 {
+        if self.held < 32 {
+            self.fill();
+        }
+        let [code_length, symbol] = tree.table[(self.buffer >> (64 - LONGEST_CODE)) as usize];
+        self.skip(code_length.into());
+        let (length, omitted) = (u32::from(symbol & 15), u32::from(symbol >> 4));
+        if length == 0 {
+            return 0;
+        }
+        let stored = length - omitted;
+        // Twice shifted: `stored` may be 0, and no shift may reach 64.
+        let bits = ((self.buffer >> 1) >> (63 - stored)) as i32;
+        self.skip(stored);
+        // Omitted bits read as one half: 1 followed by zeros.
+        let magnitude = (((bits << 1) | 1) << omitted) >> 1;
+        if magnitude >> (length - 1) & 1 == 1 {
+            magnitude
+        } else {
+            magnitude - (1 << length) + i32::from(omitted == 0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every tree's codes fill the space exactly, except the one with an unused last code.
+    #[test]
+    fn codes_are_complete() {
+        let complete =
+            |counts: &[u32]| counts.iter().zip(1..).map(|(c, l)| c << (11 - l)).sum::<u32>();
+        assert_eq!(complete(&[0, 1, 4, 2, 3, 1, 2]), 1 << 11);
+        assert_eq!(complete(&[0, 1, 4, 2, 2, 3, 1, 2]), 1 << 11);
+        assert_eq!(complete(&[0, 1, 5, 1, 1, 1, 1, 1, 1, 2]), 1 << 11);
+        assert_eq!(complete(&[0, 1, 4, 3, 1, 1, 1, 1, 1, 2]), 1 << 11);
+        assert_eq!(complete(&[0, 1, 5, 1, 1, 1, 1, 1, 1, 1, 2]), 1 << 11);
+    }
+
+    fn check(bits: &str, tree: &Tree, expected: &[i32]) {
+        let digits: Vec<u8> =
+            bits.bytes().filter(|byte| *byte != b' ').map(|byte| byte - b'0').collect();
+        let bytes: Vec<u8> = digits
+            .chunks(8)
+            .map(|eight| (0..8).fold(0, |byte, i| byte << 1 | eight.get(i).copied().unwrap_or(0)))
+            .collect();
+        let mut differences = Differences::new(&bytes);
+        let found: Vec<i32> = expected.iter().map(|_| differences.next(tree)).collect();
+        assert_eq!(found, expected);
+        assert!(!differences.overrun());
+    }
+
+    #[test]
+    fn differences_read_as_in_the_description() {
+        // 14 bits lossless: 00 is seven bits long, 010 six, 011 eight, 100 five.
+        check(
+            "00 1000000 | 00 0000000".replace('|', "").as_str(),
+            &Tree::lossless(14),
+            &[64, -127],
+        );
+        check("010 111111 100 00000 100 01111", &Tree::lossless(14), &[63, -31, -16]);
+        // After the split, 010 is twelve bits of which seven are stored... the low five read as 10000.
+        check("010 1000000 010 0000000", &Tree::lossy_after_split(14), &[2048 + 16, -4096 + 16]);
+    }
+
+    #[test]
+    fn the_end_is_noticed() {
+        let mut differences = Differences::new(&[0b0010_0000]);
+        differences.next(&Tree::lossless(14));
+        assert!(differences.overrun());
+    }
+}
