@@ -1,5 +1,7 @@
 //! Real camera files decode to what libraw returns.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
+
 use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 use weavelight::raw::{Hint, Layout, Samples, decode, decode_uncropped};

@@ -47,7 +47,7 @@ pub(crate) fn samples(bytes: &[u8], size: [usize; 3]) -> Result<Vec<u16>, Decode
     let image = load(bytes, Want::Everything)?;
     let found = [image.width, image.height, image.cpp];
     let samples = integers(image.data)?;
-    if found != size || samples.len() != size.iter().product() {
+    if found != size || samples.len() != size.iter().product::<usize>() {
         return Err(DecodeError::damaged(format!(
             "its decoder found {found:?} where its tags say {size:?}"
         )));

@@ -39,8 +39,10 @@ impl Stored {
                 format!("its visible area {left}..{right} x {top}..{bottom} is not inside it");
             return Err(DecodeError::damaged(what));
         }
-        let levels = self.black.iter().zip(&self.saturation);
-        if let Some((black, white)) = levels.clone().find(|(black, white)| !(black < white)) {
+        let mut levels = self.black.iter().zip(&self.saturation);
+        if let Some((black, white)) =
+            levels.find(|(black, white)| black >= white || black.is_nan() || white.is_nan())
+        {
             return Err(DecodeError::damaged(format!(
                 "black level {black} is not below white level {white}"
             )));
