@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use super::method::RELATIVE_FLOOR;
+use super::method::{RELATIVE_FLOOR, START_LEVEL};
 use super::pieces::{Piece, Pieces};
 use super::row::{RowInput, VarianceModel};
 
@@ -31,6 +31,8 @@ pub(crate) struct Block {
     pub(crate) noise_scale: Lanes,
     /// The brightest usable sample.
     pub(crate) level: Lanes,
+    /// Samples above [`START_LEVEL`] of it.
+    pub(crate) bright: Lanes,
     pub(crate) sample: Vec<Sample>,
 }
 
@@ -159,6 +161,13 @@ impl Block {
         for sample in &self.sample {
             for k in 0..LANES {
                 self.level[k] = self.level[k].max(sample.y[k].abs());
+            }
+        }
+        self.bright = ZERO;
+        for sample in &self.sample {
+            for k in 0..LANES {
+                self.bright[k] +=
+                    if sample.y[k] > START_LEVEL as f32 * self.level[k] { 1.0 } else { 0.0 };
             }
         }
     }

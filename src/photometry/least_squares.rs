@@ -67,9 +67,8 @@ fn columns(linear: &Linear, offset: &Lanes) -> [Lanes; 3] {
 /// Residual and covariance (the sandwich P V P^T) of a plain solution; `column(i)` is light i's column of P.
 #[inline(always)]
 fn describe(block: &Block, g: [Lanes; 3], column: impl Fn(usize) -> [Lanes; 3]) -> Surface {
-    let mut surface =
-        Surface { g, tangent_variance: ZERO, squares: ZERO, count: ZERO, carried: [true; LANES] };
-    let (normal, _) = surface.normal_and_albedo();
+    let mut surface = Surface::new(g, 0.0);
+    let (normal, _) = surface.normal_and_length();
     let [gx, gy, gz] = &surface.g;
     for (i, sample) in block.sample.iter().enumerate() {
         let [lx, ly, lz] = &sample.light;

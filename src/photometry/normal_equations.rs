@@ -1,6 +1,7 @@
 //! Weighted normal equations of a block of photosites: sums over lights, their 3 x 3 solution, and what it says.
 
 use super::block::{Block, LANES, Lanes, ZERO};
+use super::method::{BEHIND_DEVIATIONS, BEHIND_LEVEL, LIT_ABOVE_FLOOR, START_LEVEL, START_SAMPLES};
 use super::row::VarianceModel;
 
 /// sum w l l^T, sum w l r and company, with r = y - l . g the residual at the g that the sums were taken at.
@@ -20,6 +21,8 @@ pub(crate) struct Sums {
 pub(crate) enum Weighting {
     /// 1 for every usable sample.
     Equal,
+    /// 1 for the samples near the photosite's own level, or every usable one where these are too few.
+    Bright,
     /// 1 / var at the predicted value; lights behind the surface get none.
     Noise,
     /// Those of the latest solve.
@@ -37,14 +40,22 @@ pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting
         match weighting {
             Weighting::Equal => sample.weight = sample.usable,
             Weighting::Kept => {}
+            Weighting::Bright => {
+                for k in 0..LANES {
+                    let bright = sample.y[k] > START_LEVEL as f32 * block.level[k];
+                    let few = block.bright[k] < START_SAMPLES as f32;
+                    sample.weight[k] = if bright || few { sample.usable[k] } else { 0.0 };
+                }
+            }
             Weighting::Noise => {
                 let [even, odd] = sample.variance;
                 for k in 0..LANES {
                     let predicted = lx[k] * g[0][k] + ly[k] * g[1][k] + lz[k] * g[2][k];
                     let model = if block.odd[k] == 0 { even } else { odd };
-                    let variance = variance(model, predicted, block.noise_scale[k]).max(least[k]);
-                    sample.weight[k] =
-                        if predicted > 0.0 { sample.usable[k] / variance } else { 0.0 };
+                    let scale = block.noise_scale[k];
+                    let variance = variance(model, predicted, scale).max(least[k]);
+                    let lit = is_lit(model, predicted, sample.y[k], block.level[k], scale);
+                    sample.weight[k] = if lit { sample.usable[k] / variance } else { 0.0 };
                 }
             }
         }
@@ -62,6 +73,18 @@ pub(crate) fn variance(model: VarianceModel, predicted: f32, noise_scale: f32) -
     let predicted = predicted.max(0.0);
     let model_error = model.kappa * predicted;
     noise_scale * (model.shot * predicted + model.floor * noise_scale) + model_error * model_error
+}
+
+/// Whether a light stands in front of the surface, see [`LIT_ABOVE_FLOOR`]. Squares stand for the roots.
+#[inline(always)]
+fn is_lit(model: VarianceModel, predicted: f32, y: f32, level: f32, noise_scale: f32) -> bool {
+    let square = |a: f32| a * a;
+    let floor = variance(model, 0.0, noise_scale) * square(LIT_ABOVE_FLOOR as f32);
+    let spread = variance(model, level, noise_scale) * square(BEHIND_DEVIATIONS as f32);
+    let beyond = -(predicted + BEHIND_LEVEL as f32 * level);
+    let arrives = (y > 0.0) & (square(y) > floor);
+    let behind = (beyond > 0.0) & (square(beyond) > spread);
+    (predicted > 0.0) | (arrives & !behind)
 }
 
 impl Sums {

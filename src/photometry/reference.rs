@@ -3,7 +3,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::method::{COPLANAR_CONDITION, MAX_LIGHTS, Method, RELATIVE_FLOOR, REWEIGHTINGS};
+use super::method::{
+    BEHIND_DEVIATIONS, BEHIND_LEVEL, COPLANAR_CONDITION, LIT_ABOVE_FLOOR, MAX_LIGHTS,
+    MOST_LENGTHENING, Method, RELATIVE_FLOOR, REWEIGHTINGS, START_LEVEL, START_SAMPLES,
+};
 use super::row::{Outcome, RowInput, RowOutput, VarianceModel};
 
 /// One photosite solved, or why not.
@@ -82,16 +85,23 @@ pub fn solve_pixel(samples: &Samples, method: Method) -> Pixel {
     if count < 3 {
         return Pixel::TooFewLights { usable: count };
     }
-    let Some(start) = samples.solve(samples.equal_weights(&usable)) else {
+    let Some(start) = samples.solve(equal_weights(&usable)) else {
         return Pixel::CoplanarLights;
     };
     match method {
-        Method::LeastSquares => samples.describe(&start, samples.sandwich(&start), Outcome::Fitted),
+        Method::LeastSquares => {
+            let lengthening = 0.0;
+            samples.describe(&start, samples.sandwich(&start), lengthening, Outcome::Fitted)
+        }
         Method::Weighted | Method::Robust | Method::Auto => {
-            let solution = samples.reweighted(&usable, start);
-            samples.describe(&solution, solution.inverse, Outcome::Fitted)
+            let solution = samples.weighted(&usable, start);
+            samples.describe(&solution, solution.inverse, MOST_LENGTHENING, Outcome::Fitted)
         }
     }
+}
+
+fn equal_weights(used: &[bool; MAX_LIGHTS]) -> [f64; MAX_LIGHTS] {
+    used.map(|u| if u { 1.0 } else { 0.0 })
 }
 
 impl Samples<'_> {
@@ -102,10 +112,6 @@ impl Samples<'_> {
             *usable = y.is_finite() && light.iter().all(|c| c.is_finite());
         }
         usable
-    }
-
-    fn equal_weights(&self, usable: &[bool; MAX_LIGHTS]) -> [f64; MAX_LIGHTS] {
-        usable.map(|u| if u { 1.0 } else { 0.0 })
     }
 
     /// argmin over g of sum w (y - g . l)^2; `None` where the lights that count lie in a plane.
@@ -121,9 +127,9 @@ impl Samples<'_> {
         Some(Solution { g: inverse * right, inverse, weights })
     }
 
-    /// Repeats the solve with weights from the fit before.
-    fn reweighted(&self, usable: &[bool; MAX_LIGHTS], start: Solution) -> Solution {
-        let mut solution = start;
+    /// Weighted solution; `plain` is the solution with every usable sample.
+    fn weighted(&self, usable: &[bool; MAX_LIGHTS], plain: Solution) -> Solution {
+        let mut solution = self.solve(equal_weights(&self.bright(usable))).unwrap_or(plain);
         for _ in 0..REWEIGHTINGS {
             let lit = self.weights_at(&solution.g, usable, true);
             solution = match self
@@ -137,6 +143,16 @@ impl Samples<'_> {
         solution
     }
 
+    /// Samples for the plain start: those near the photosite's own level, or all where these are too few.
+    fn bright(&self, usable: &[bool; MAX_LIGHTS]) -> [bool; MAX_LIGHTS] {
+        let least = START_LEVEL * self.level(usable);
+        let mut bright = *usable;
+        for (bright, &y) in bright.iter_mut().zip(self.y) {
+            *bright &= y > least;
+        }
+        if bright.iter().filter(|&&b| b).count() < START_SAMPLES { *usable } else { bright }
+    }
+
     /// 1 / var at the value that `g` predicts; zero for unusable samples and, if `lit_only`, for lights behind the surface.
     pub(crate) fn weights_at(
         &self,
@@ -144,16 +160,25 @@ impl Samples<'_> {
         usable: &[bool; MAX_LIGHTS],
         lit_only: bool,
     ) -> [f64; MAX_LIGHTS] {
-        let least = (RELATIVE_FLOOR * self.level(usable)).powi(2).max(f64::MIN_POSITIVE);
+        let level = self.level(usable);
+        let least = (RELATIVE_FLOOR * level).powi(2).max(f64::MIN_POSITIVE);
         let mut weights = [0.0; MAX_LIGHTS];
         for (i, l) in self.lights.iter().enumerate().filter(|&(i, _)| usable[i]) {
             let predicted = g.dot(l);
-            if predicted > 0.0 || !lit_only {
+            if !lit_only || self.is_lit(i, predicted, level) {
                 weights[i] =
                     1.0 / variance(&self.variance[i], predicted, self.noise_scale).max(least);
             }
         }
         weights
+    }
+
+    /// Whether light `i` stands in front of the surface, see [`LIT_ABOVE_FLOOR`].
+    fn is_lit(&self, i: usize, predicted: f64, level: f64) -> bool {
+        let deviation = |at: f64| variance(&self.variance[i], at, self.noise_scale).sqrt();
+        let arrives = self.y[i] > LIT_ABOVE_FLOOR * deviation(0.0);
+        let behind = predicted + BEHIND_LEVEL * level < -BEHIND_DEVIATIONS * deviation(level);
+        predicted > 0.0 || (arrives && !behind)
     }
 
     /// The brightest usable sample.
@@ -162,14 +187,21 @@ impl Samples<'_> {
         values.fold(0.0, |level, (y, _)| level.max(y.abs()))
     }
 
-    fn describe(&self, solution: &Solution, covariance: Matrix3<f64>, outcome: Outcome) -> Pixel {
-        let albedo = solution.g.norm();
-        if !(albedo > 0.0 && albedo.is_finite() && solution.g.z > 0.0) {
+    fn describe(
+        &self,
+        solution: &Solution,
+        covariance: Matrix3<f64>,
+        most_lengthening: f64,
+        outcome: Outcome,
+    ) -> Pixel {
+        let length = solution.g.norm();
+        if !(length > 0.0 && length.is_finite() && solution.g.z > 0.0) {
             return Pixel::NoSurface;
         }
-        let normal = solution.g / albedo;
+        let normal = solution.g / length;
         let across_normal = covariance.trace() - normal.dot(&(covariance * normal));
-        let expected_error = across_normal.max(0.0).sqrt() / albedo;
+        let expected_error = across_normal.max(0.0).sqrt() / length;
+        let albedo = length * (1.0 - (0.5 * expected_error.powi(2)).min(most_lengthening));
         let residual = self.residual(solution);
         Pixel::Fitted(Fit {
             normal,

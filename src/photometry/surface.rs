@@ -14,27 +14,37 @@ pub(crate) struct Surface {
     pub(crate) count: Lanes,
     /// `false` where a photosite needs another path: samples missing, lights too badly conditioned for float32.
     pub(crate) carried: [bool; LANES],
+    /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
+    most_lengthening: f32,
 }
 
 /// |g|^2 outside this range may have lost bits to underflow or overflow: float64 takes over.
 const COMFORTABLE: std::ops::Range<f32> = 1e-24..1e24;
 
 impl Surface {
-    /// Unit normal (0 where there is none), albedo in the block's units.
+    /// A solution of which nothing is known yet.
     #[inline(always)]
-    pub(crate) fn normal_and_albedo(&self) -> ([Lanes; 3], Lanes) {
+    pub(crate) fn new(g: [Lanes; 3], most_lengthening: f64) -> Self {
+        let carried = [true; LANES];
+        let most_lengthening = most_lengthening as f32;
+        Self { g, tangent_variance: ZERO, squares: ZERO, count: ZERO, carried, most_lengthening }
+    }
+
+    /// Unit normal (0 where there is none), length of g in the block's units.
+    #[inline(always)]
+    pub(crate) fn normal_and_length(&self) -> ([Lanes; 3], Lanes) {
         let [x, y, z] = &self.g;
-        let (mut normal, mut albedo) = ([ZERO; 3], ZERO);
+        let (mut normal, mut lengths) = ([ZERO; 3], ZERO);
         for k in 0..LANES {
             let square = x[k] * x[k] + y[k] * y[k] + z[k] * z[k];
             let length = square.sqrt();
-            albedo[k] = length;
+            lengths[k] = length;
             let scale = if COMFORTABLE.contains(&square) { 1.0 / length } else { 0.0 };
             normal[0][k] = x[k] * scale;
             normal[1][k] = y[k] * scale;
             normal[2][k] = z[k] * scale;
         }
-        (normal, albedo)
+        (normal, lengths)
     }
 
     /// Writes the block's photosites and hands the lanes that float32 cannot carry to `refused`.
@@ -46,21 +56,23 @@ impl Surface {
         output: &mut RowOutput,
         mut refused: impl FnMut(usize, &mut RowOutput),
     ) {
-        let (normal, albedo) = self.normal_and_albedo();
-        let (mut error_deg, mut residual) = (ZERO, ZERO);
+        let (normal, length) = self.normal_and_length();
+        let (mut albedo, mut error_deg, mut residual) = (ZERO, ZERO, ZERO);
+        let per_unit = (1.0 / unit) as f32;
         for k in 0..LANES {
-            let relative = self.tangent_variance[k].max(0.0).sqrt() / albedo[k];
+            let relative = self.tangent_variance[k].max(0.0).sqrt() / length[k];
+            let lengthening = (0.5 * relative * relative).min(self.most_lengthening);
+            albedo[k] = length[k] * (1.0 - lengthening) * per_unit;
             error_deg[k] = (relative * (180.0 / std::f32::consts::PI)).min(MOST_ERROR_DEG as f32);
             residual[k] = (self.squares[k].max(0.0) / self.count[k].max(1.0)).sqrt();
         }
-        let per_unit = (1.0 / unit) as f32;
         for k in 0..block.len {
             let column = block.column[k];
-            if !(self.carried[k] && COMFORTABLE.contains(&(albedo[k] * albedo[k]))) {
+            if !(self.carried[k] && COMFORTABLE.contains(&(length[k] * length[k]))) {
                 refused(k, output);
             } else if normal[2][k] > 0.0 {
                 output.normal[column] = [normal[0][k], normal[1][k], normal[2][k]];
-                output.albedo[column] = albedo[k] * per_unit;
+                output.albedo[column] = albedo[k];
                 output.expected_error_deg[column] = error_deg[k];
                 output.residual[column] = residual[k];
                 output.outcome[column] = Outcome::Fitted;

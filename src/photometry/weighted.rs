@@ -1,7 +1,7 @@
 //! Weighted least squares of a block, with lights behind the surface left out.
 
 use super::block::{Block, LANES, ZERO};
-use super::method::REWEIGHTINGS;
+use super::method::{MOST_LENGTHENING, REWEIGHTINGS};
 use super::normal_equations::{Sums, Weighting, accumulate, times};
 use super::surface::Surface;
 
@@ -21,7 +21,7 @@ pub(crate) struct Weighted {
 /// Plain start, then reweighted solves.
 #[inline(always)]
 pub(crate) fn solve_weighted(block: &mut Block) -> Weighted {
-    let start = accumulate(block, &[ZERO; 3], Weighting::Equal);
+    let start = accumulate(block, &[ZERO; 3], Weighting::Bright);
     let (inverse, _) = start.inverse();
     let mut g = times(&inverse, &start.right);
     let mut sums = accumulate(block, &g, Weighting::Noise);
@@ -53,8 +53,7 @@ pub(crate) fn finish(
     inverse: [[f32; LANES]; 6],
     condition_squared: &[f32; LANES],
 ) -> Weighted {
-    let mut surface =
-        Surface { g, tangent_variance: ZERO, squares: ZERO, count: ZERO, carried: [true; LANES] };
+    let mut surface = Surface::new(g, MOST_LENGTHENING);
     let mut chi_square = ZERO;
     let [gx, gy, gz] = &surface.g;
     for sample in &block.sample {
@@ -68,7 +67,7 @@ pub(crate) fn finish(
             surface.count[k] += used;
         }
     }
-    let (normal, _) = surface.normal_and_albedo();
+    let (normal, _) = surface.normal_and_length();
     let [px, py, pz] = &times(&inverse, &normal);
     for k in 0..LANES {
         let along = px[k] * normal[0][k] + py[k] * normal[1][k] + pz[k] * normal[2][k];
