@@ -17,5 +17,6 @@ pub mod instrument;
 pub mod photometry;
 pub mod raster;
 pub mod raw;
+pub mod report;
 pub mod session;
 pub mod solution;

@@ -1,0 +1,10 @@
+//! What a command tells: pictures small enough to look at, distributions, and one self-contained HTML page.
+
+mod distribution;
+mod page;
+pub mod picture;
+mod solution;
+
+pub use distribution::Distribution;
+pub use picture::Thumbnail;
+pub use solution::{Figure, SolutionPage, TruthErrors, Verdict};
