@@ -6,4 +6,5 @@
 
 pub mod description;
 pub mod irradiance;
+pub mod lights;
 pub mod projection;

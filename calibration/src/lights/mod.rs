@@ -1,0 +1,23 @@
+//! Where the LEDs are, how they shine and how strongly, from pictures of white sheets.
+
+mod basis;
+mod emission;
+mod fit;
+mod gain;
+mod joint;
+mod observation;
+mod system;
+mod uncertainty;
+
+pub use emission::{Emitter, Place};
+pub use fit::{Error, Fit, FittedLight, Settings, fit};
+pub use gain::{Gains, gains, has_several_poses};
+pub use joint::Prior;
+#[cfg(test)]
+use joint::median;
+pub use observation::{Cell, PoseSigma, Sample, Sheet};
+
+#[cfg(test)]
+mod bench_scene;
+#[cfg(test)]
+mod tests;
