@@ -134,7 +134,7 @@ fn check_cells(sheets: &[Sheet], lights: usize) -> Result<(), Error> {
 
 /// What a run of the fit moves.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Stage {
+enum Stage {
     /// All of it, the ruler's quality estimated too.
     Everything,
     /// Positions that are not claimed stay at the ruler's.
@@ -157,6 +157,8 @@ const SETTLED: f64 = 1e-2;
 const SETTLED_ENOUGH: f64 = 0.5;
 /// Linearisations after which the scales of noise, slow errors and ruler are left alone.
 const SCALE_ROUNDS: usize = 9;
+/// Expected gain of the cost below which the model is near enough to judge the ruler by and to call the scales calm.
+const NEAR: f64 = 1e3;
 /// Relative change of the scale of the slow errors below which it is settled.
 const SCALE_SETTLED: f64 = 0.1;
 
@@ -166,21 +168,24 @@ fn settle(
     settings: &Settings,
     stage: Stage,
 ) -> Result<Settled, Error> {
-    let mut open = true;
+    let (mut open, mut near) = (true, false);
     let mut lambda = 0.0;
     let mut ripples: Vec<DVector<f64>> = Vec::new();
     for iterations in 1..=settings.max_iterations {
-        let residuals = problem.without_ripples(&problem.residuals(&state), &ripples);
-        let weights = problem.weights(&residuals);
+        // Outliers are judged with slow errors and all: a hand's shadow must not pass for one.
+        let all = problem.residuals(&state);
+        let weights = problem.weights(&all);
+        let residuals = problem.without_ripples(&all, &ripples);
         if open {
             problem.data_scale = data_scale(problem, &residuals, &weights);
         }
         let systems = problem.systems(&state, &weights);
         if open {
             let before = problem.kappa;
-            estimate_scales(problem, &systems, &state, stage)?;
-            let calm = iterations > 3 && (problem.kappa / before).ln().abs() < SCALE_SETTLED;
-            open = !(calm || iterations >= SCALE_ROUNDS);
+            let ruler = stage == Stage::Everything && near;
+            estimate_scales(problem, &systems, &state, ruler)?;
+            let calm = near && (problem.kappa / before).ln().abs() < SCALE_SETTLED;
+            open = !calm && (iterations < SCALE_ROUNDS || !near);
         }
         let at = problem.assemble(&systems, &state, problem.kappa).ok_or(Error::Singular)?;
         ripples = problem.ripples_from(&systems).ok_or(Error::Singular)?;
@@ -190,6 +195,7 @@ fn settle(
             let covariance = covariance(&at).ok_or(Error::Singular)?;
             return Ok(Settled { state, covariance, residuals, weights, iterations });
         }
+        near |= decrement < NEAR;
         state = next;
     }
     Err(Error::NotConverged { iterations: settings.max_iterations })
@@ -197,7 +203,20 @@ fn settle(
 
 /// A sheet at one pose leaves a long curved valley: a full step along it first climbs, and the next one falls back to the
 /// floor much farther on. Only steps that climb beyond this factor are shortened.
-const TOLERATED: f64 = 100.0;
+const TOLERATED: f64 = 10.0;
+
+/// Longest step of a coordinate, in its prior's sigmas.
+const LONGEST_STEP: f64 = 3.0;
+
+/// The largest share of a coordinate's prior sigma that a step takes.
+fn longest(problem: &Problem, step: &DVector<f64>) -> f64 {
+    problem
+        .prior_weights()
+        .iter()
+        .zip(step.iter())
+        .map(|(weight, step)| weight.sqrt() * step.abs())
+        .fold(0.0, f64::max)
+}
 
 /// A step that lowers the cost at fixed weights, and how much it was expected to.
 fn advance(
@@ -208,8 +227,9 @@ fn advance(
     lambda: &mut f64,
 ) -> Result<(State, f64), Error> {
     for _ in 0..12 {
-        let step = damped_step(problem, at, *lambda).ok_or(Error::Singular)?;
+        let mut step = damped_step(problem, at, *lambda).ok_or(Error::Singular)?;
         let decrement = 0.5 * step.dot(&at.descent);
+        step *= (LONGEST_STEP / longest(problem, &step)).min(1.0);
         let next = state.moved(&step);
         let cost = || {
             problem

@@ -10,12 +10,12 @@ use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
 pub(super) const PER_SHEET: usize = 3;
 /// Systematic part of a cell's relative error below which weighting by photon noise makes no sense.
 const SIGMA_FLOOR: f64 = 3e-4;
-/// Residuals beyond this many scales lose their weight quickly (Geman-McClure; 97 % efficient for Gaussian noise).
-const ROBUST_SCALES: f64 = 4.0;
+/// Residuals beyond this many scales do not count (Tukey's biweight; 98 % efficient for Gaussian noise).
+const ROBUST_SCALES: f64 = 6.0;
 /// The overall intensity is free in ratio mode; its mean is held with this weight.
 const GAUGE_WEIGHT: f64 = 1e6;
 /// Degree of the polynomials that stand for slow, light-dependent errors (the sheet's reflectance lobe, stray light).
-const RIPPLE_DEGREE: usize = 4;
+const RIPPLE_DEGREE: usize = 5;
 /// Beyond this many lights the lower degree is enough of a load.
 const MANY_LIGHTS: usize = 16;
 const RIPPLE_DEGREE_FOR_MANY: usize = 3;
@@ -184,7 +184,7 @@ impl<'a> Problem<'a> {
         let scale = (1.4826 * freedom * median(&mut sizes)).max(1e-3);
         let weigh = |(s, of_sheet): (usize, &Vec<f64>)| {
             let weight = |(k, u): (usize, &f64)| {
-                let robust = (1.0 + (u / (ROBUST_SCALES * scale)).powi(2)).powi(-2);
+                let robust = (1.0 - (u / (ROBUST_SCALES * scale)).powi(2)).max(0.0).powi(2);
                 if u.is_finite() { robust / self.sigma(s, k).powi(2) } else { 0.0 }
             };
             of_sheet.iter().enumerate().map(weight).collect()

@@ -1,7 +1,7 @@
 //! What correlated residuals leave of the information, and how good the ruler really was.
 
 use super::emission::PER_LIGHT;
-use super::fit::{Error, Stage};
+use super::fit::Error;
 use super::joint::{Linearised, Problem, State, median, weighted_mean};
 use super::system::SheetSystem;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -15,9 +15,9 @@ const INLIER_WEIGHT: f64 = 0.25;
 /// RMS of slow errors that is thought possible: below the first they do not matter, above the last it is no white sheet.
 const SLOW_ERRORS: (f64, f64) = (1e-5, 0.05);
 /// The ruler's sigma is trusted within this factor either way.
-const RULER_SCALES: (f64, f64) = (0.5, 4.0);
+const RULER_SCALES: (f64, f64) = (0.5, 1.6);
 /// Spread of ln(ruler scale) before the data.
-const RULER_SPREAD: f64 = 0.5;
+const RULER_SPREAD: f64 = 0.3;
 
 /// Variance of the noise per independent cell, in units of the readings' variance.
 ///
@@ -124,15 +124,16 @@ fn sheet_blocks(
     (square, (blocks.len() * lights) as f64, blocks.len() as f64)
 }
 
-/// Sets the RMS of the slow errors and the factor on the ruler's sigma to what makes the pictures most probable.
+/// Sets the RMS of the slow errors, and with `ruler` the factor on the ruler's sigma, to what makes the pictures most
+/// probable.
 pub(super) fn estimate_scales(
     problem: &mut Problem,
     systems: &[SheetSystem],
     state: &State,
-    stage: Stage,
+    ruler: bool,
 ) -> Result<(), Error> {
     problem.kappa = slow_error_rms(problem, systems, state);
-    if stage == Stage::Everything {
+    if ruler {
         let at = problem.assemble(systems, state, problem.kappa).ok_or(Error::Singular)?;
         problem.ruler_scale = ruler_scale(problem, state, &at);
     }
