@@ -20,3 +20,4 @@ pub mod raw;
 pub mod report;
 pub mod session;
 pub mod solution;
+pub mod solve;

@@ -2,9 +2,10 @@
 //! from observations. Pure functions: no I/O, clock, thread or log.
 //!
 //! [`description`] holds plain data and conventions only; it is all that the simulator may use (a house rule checks
-//! it). Everything that *computes* with a description ([`projection`], [`irradiance`]) lives beside it.
+//! it). Everything that *computes* with a description ([`projection`], [`irradiance`], [`gain`]) lives beside it.
 
 pub mod description;
+pub mod gain;
 pub mod irradiance;
 pub mod lights;
 pub mod projection;

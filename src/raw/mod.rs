@@ -4,6 +4,7 @@
 //! visible area, with the mosaic's phase and the levels counted from its top left.
 
 mod camera;
+mod demosaic;
 mod dng;
 mod error;
 mod frame;
@@ -17,6 +18,7 @@ mod sensor;
 mod tags;
 mod unpack;
 
+pub use demosaic::demosaic;
 pub use error::{DecodeError, ReadError};
 pub use frame::{Frame, Layout, Metadata, Samples};
 pub use hint::{Encoding, Hint};

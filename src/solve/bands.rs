@@ -1,0 +1,343 @@
+//! Bands of rows over threads: each row of frames is normalised, solved and written to the maps while it is in the
+//! cache. Every row is solved by itself, so that the result cannot depend on how rows are shared out.
+
+use super::field::{FieldRows, LightField};
+use super::maps::{Albedo, Counts, Maps};
+use super::noise::{AmbientNoise, LinearNoise, exposure_variances, merged_variance};
+use super::scene::Scene;
+use super::signal::{Normalizer, SignalRows};
+use crate::photometry::{FieldRow, Method, Outcome, RowInput, RowOutput, RowSolver, VarianceModel};
+use crate::raw::Layout;
+use rayon::prelude::*;
+use std::ops::Range;
+use weavelight_calibration::description::Image;
+
+/// Rows of a band: several rows of light-field nodes each, and enough bands for many threads.
+const BAND_ROWS: usize = 64;
+
+/// A scene with everything that its rows share.
+pub(crate) struct Run<'a> {
+    scene: &'a Scene,
+    field: &'a LightField<'a>,
+    normalizer: Normalizer<'a>,
+    method: Method,
+    /// Per light and exposure: share in the mean, and variance per place of the 2 x 2 cell.
+    weights: Vec<Vec<f64>>,
+    exposure_variance: Vec<Vec<[VarianceModel; 4]>>,
+    /// Per row parity and light: variance at even and odd columns with every exposure used.
+    variance: [Vec<[VarianceModel; 2]>; 2],
+}
+
+/// Mutable parts of the maps that one band owns.
+struct Band<'m> {
+    first_row: usize,
+    normal: &'m mut [[f32; 3]],
+    albedo: &'m mut [f32],
+    rgb: &'m mut [[f32; 3]],
+    expected_error_deg: &'m mut [f32],
+    outcome: &'m mut [Outcome],
+}
+
+/// What a thread keeps from row to row.
+#[derive(Default)]
+struct Worker {
+    rows: SignalRows,
+    solver: RowSolver,
+    residual: Vec<f32>,
+    kept: Vec<u64>,
+}
+
+impl<'a> Run<'a> {
+    pub(crate) fn new(
+        scene: &'a Scene,
+        field: &'a LightField<'a>,
+        noise: LinearNoise,
+        method: Method,
+    ) -> Self {
+        let equal: Vec<Vec<f64>> =
+            scene.lights.iter().map(|light| vec![1.0; light.exposures.len()]).collect();
+        let rate = Normalizer::new(scene, &equal).mean_ambient_rate();
+        let ambient = AmbientNoise::new(&scene.ambient, rate, noise);
+        let exposure_variance = exposure_variances(scene, noise, ambient);
+        let weights: Vec<Vec<f64>> =
+            exposure_variance.iter().map(|of| exposure_weights(of)).collect();
+        let variance = [0, 1].map(|parity| {
+            let all = exposure_variance.iter().zip(&weights);
+            all.map(|(of, weights)| variance_of_row(of, weights, parity, u64::MAX)).collect()
+        });
+        let normalizer = Normalizer::new(scene, &weights);
+        Self { scene, field, normalizer, method, weights, exposure_variance, variance }
+    }
+
+    /// Solves the whole picture on the current thread pool. `done` is told of every finished row.
+    pub(crate) fn solve(&self, done: &(dyn Fn(usize) + Sync)) -> Maps {
+        let (width, height) = (self.scene.width, self.scene.height);
+        let mut normal = Image::filled(width, height, [0.0_f32; 3]);
+        let mut expected_error_deg = Image::filled(width, height, 0.0_f32);
+        let mut outcome = Image::filled(width, height, Outcome::Masked);
+        let colour = self.scene.layout == Layout::Rgb;
+        let mut rgb = Image::filled(if colour { width } else { 0 }, height, [0.0_f32; 3]);
+        let mut albedo = Image::filled(width, height, 0.0_f32);
+        let pixels = width * BAND_ROWS;
+        // A picture without colour has bands of no pixels there.
+        let mut rgb_bands: Vec<&mut [[f32; 3]]> = rgb.data.chunks_mut(pixels).collect();
+        rgb_bands.resize_with(height.div_ceil(BAND_ROWS), || &mut []);
+        let bands = normal
+            .data
+            .par_chunks_mut(pixels)
+            .zip(albedo.data.par_chunks_mut(pixels))
+            .zip(expected_error_deg.data.par_chunks_mut(pixels))
+            .zip(outcome.data.par_chunks_mut(pixels))
+            .zip(rgb_bands)
+            .enumerate()
+            .map(|(index, ((((normal, albedo), expected_error_deg), outcome), rgb))| Band {
+                first_row: index * BAND_ROWS,
+                normal,
+                albedo,
+                rgb,
+                expected_error_deg,
+                outcome,
+            });
+        let parts: Vec<Counts> = bands
+            .map_init(Worker::default, |worker, band| self.solve_band(worker, band, done))
+            .collect();
+        let mut counts = Counts::default();
+        parts.iter().for_each(|part| counts.add(part));
+        let albedo = match self.scene.layout {
+            Layout::Mosaic(cfa) => Albedo::Mosaic(albedo, cfa),
+            Layout::Grey => Albedo::Grey(albedo),
+            Layout::Rgb => Albedo::Rgb(rgb),
+        };
+        Maps { normal, albedo, expected_error_deg, outcome, counts }
+    }
+
+    fn solve_band(
+        &self,
+        worker: &mut Worker,
+        mut band: Band,
+        done: &(dyn Fn(usize) + Sync),
+    ) -> Counts {
+        let width = self.scene.width;
+        let mut field = FieldRows::new(self.field);
+        let mut counts = Counts::default();
+        for row in 0..band.outcome.len() / width {
+            let y = band.first_row + row;
+            if let Some(columns) = self.columns_inside(y) {
+                let field = field.row(y, columns.start);
+                self.solve_row(worker, &mut band, y, columns, field, &mut counts);
+            } else {
+                counts.outcomes[Outcome::Masked as usize] += width;
+            }
+            done(1);
+        }
+        counts
+    }
+
+    /// The columns from the first to the last inside the mask, begun where a node of the light field stands at an even
+    /// column; `None` where the whole row is outside.
+    fn columns_inside(&self, y: usize) -> Option<Range<usize>> {
+        let Some(mask) = &self.scene.mask else { return Some(0..self.scene.width) };
+        let row = mask.row(y);
+        let (first, last) =
+            (row.iter().position(|&inside| inside)?, row.iter().rposition(|&inside| inside)?);
+        let align = self.field.step().max(2);
+        Some(first / align * align..last + 1)
+    }
+
+    fn solve_row(
+        &self,
+        worker: &mut Worker,
+        band: &mut Band,
+        y: usize,
+        columns: Range<usize>,
+        field: FieldRow,
+        counts: &mut Counts,
+    ) {
+        let Worker { rows, solver, residual, kept } = worker;
+        self.normalizer.row(y, columns.clone(), rows);
+        let inside = self.scene.mask.as_ref().map(|mask| &mask.row(y)[columns.clone()]);
+        if let Some(inside) = inside {
+            rows.blank(inside);
+        }
+        residual.resize(columns.len(), 0.0);
+        kept.resize(columns.len(), 0);
+        let at = (y - band.first_row) * self.scene.width;
+        let span = at + columns.start..at + columns.end;
+        let mut output = RowOutput {
+            normal: &mut band.normal[span.clone()],
+            albedo: &mut band.albedo[span.clone()],
+            expected_error_deg: &mut band.expected_error_deg[span.clone()],
+            residual,
+            outcome: &mut band.outcome[span.clone()],
+            kept: (self.scene.layout == Layout::Rgb).then_some(kept.as_mut_slice()),
+        };
+        let signal: Vec<&[f32]> = rows.signals().iter().map(Vec::as_slice).collect();
+        let noise_scale = (!rows.noise_scale.is_empty()).then_some(rows.noise_scale.as_slice());
+        let input =
+            RowInput { signal: &signal, field, variance: &self.variance[y & 1], noise_scale };
+        // The slices are cut to fit above; were they not, the row would stay unsolved and say so.
+        if solver.solve(&input, &mut output, self.method).is_err() {
+            output.outcome.fill(Outcome::TooFewLights);
+        }
+        self.solve_incomplete(solver, rows, y, &input, &mut output);
+        if self.scene.layout == Layout::Rgb {
+            albedo_of_channels(rows, &input.field, &output, &mut band.rgb[span]);
+        }
+        for (column, outcome) in output.outcome.iter_mut().enumerate() {
+            if inside.is_some_and(|inside| !inside[column]) {
+                *outcome = Outcome::Masked;
+                rows.saturated[column] = false;
+            }
+        }
+        counts.add_row(output.outcome, output.residual);
+        counts.outcomes[Outcome::Masked as usize] += self.scene.width - columns.len();
+        counts.saturated += rows.saturated.iter().filter(|&&saturated| saturated).count();
+    }
+
+    /// Photosites at which some exposures of a light clip and others do not have variances of their own: solved again,
+    /// one by one.
+    fn solve_incomplete(
+        &self,
+        solver: &mut RowSolver,
+        rows: &SignalRows,
+        y: usize,
+        input: &RowInput,
+        output: &mut RowOutput,
+    ) {
+        for column in 0..output.outcome.len() {
+            if !self.is_incomplete(rows, column) {
+                continue;
+            }
+            let signal: Vec<&[f32]> =
+                input.signal.iter().map(|row| &row[column..=column]).collect();
+            let vectors: Vec<[f64; 3]> =
+                (0..input.field.lights).map(|light| input.field.at(column, light).into()).collect();
+            let variance: Vec<[VarianceModel; 2]> = (0..input.field.lights)
+                .map(|light| {
+                    let used = rows.used[light].get(column).copied().unwrap_or(u64::MAX);
+                    let of_row = variance_of_row(
+                        &self.exposure_variance[light],
+                        &self.weights[light],
+                        y & 1,
+                        used,
+                    );
+                    [of_row[column & 1]; 2]
+                })
+                .collect();
+            let alone = RowInput {
+                signal: &signal,
+                field: FieldRow { step: 1, vectors: &vectors, lights: input.field.lights },
+                variance: &variance,
+                noise_scale: input.noise_scale.map(|scale| &scale[column..=column]),
+            };
+            let mut place = RowOutput {
+                normal: &mut output.normal[column..=column],
+                albedo: &mut output.albedo[column..=column],
+                expected_error_deg: &mut output.expected_error_deg[column..=column],
+                residual: &mut output.residual[column..=column],
+                outcome: &mut output.outcome[column..=column],
+                kept: output.kept.as_deref_mut().map(|kept| &mut kept[column..=column]),
+            };
+            if solver.solve(&alone, &mut place, self.method).is_err() {
+                place.outcome.fill(Outcome::TooFewLights);
+            }
+        }
+    }
+
+    fn is_incomplete(&self, rows: &SignalRows, column: usize) -> bool {
+        rows.used.iter().zip(&self.weights).any(|(used, weights)| {
+            let all = all_exposures(weights.len());
+            used.get(column).is_some_and(|&used| used != 0 && used & all != all)
+        })
+    }
+}
+
+/// What the reference needs to solve the same run by the book.
+#[cfg(test)]
+impl<'a> Run<'a> {
+    /// The scene that is solved.
+    pub(crate) fn scene(&self) -> &Scene {
+        self.scene
+    }
+
+    /// Where the lights are.
+    pub(crate) fn field(&self) -> &LightField<'a> {
+        self.field
+    }
+
+    /// The kernel's method.
+    pub(crate) fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Share of an exposure in the mean of its light.
+    pub(crate) fn weight(&self, light: usize, exposure: usize) -> f64 {
+        self.weights[light][exposure]
+    }
+
+    /// Variance of a light's signal at a place of the 2 x 2 cell, with the exposures whose bit is set.
+    pub(crate) fn variance_of(&self, light: usize, place: usize, used: u64) -> VarianceModel {
+        variance_of_row(&self.exposure_variance[light], &self.weights[light], place / 2, used)
+            [place % 2]
+    }
+}
+
+/// A bit for every exposure.
+fn all_exposures(count: usize) -> u64 {
+    u64::MAX >> (64 - count.clamp(1, 64))
+}
+
+/// The weights that give the mean of several exposures the least variance, for a signal that fills half the range of the
+/// longest.
+fn exposure_weights(variance: &[[VarianceModel; 4]]) -> Vec<f64> {
+    // Shot noise in units of the signal is 1 / (electrons per unit), so half of the longest exposure's range is known
+    // only relative to the others; white (y = 1) times one half serves all.
+    let at_half = |v: &VarianceModel| {
+        1.0 / (f64::from(v.shot) * 0.5 + f64::from(v.floor)).max(f64::MIN_POSITIVE)
+    };
+    let weights: Vec<f64> =
+        variance.iter().map(|places| places.iter().map(at_half).sum()).collect();
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    weights.iter().map(|weight| weight / largest).collect()
+}
+
+/// Variance at even and odd columns of a row, of the mean of those exposures whose bit is set.
+fn variance_of_row(
+    exposures: &[[VarianceModel; 4]],
+    weights: &[f64],
+    row_parity: usize,
+    used: u64,
+) -> [VarianceModel; 2] {
+    [0, 1].map(|column| {
+        let parts: Vec<(f64, VarianceModel)> = exposures
+            .iter()
+            .zip(weights)
+            .enumerate()
+            .filter(|(bit, _)| used >> (*bit).min(63) & 1 == 1)
+            .map(|(_, (places, &weight))| (weight, places[row_parity * 2 + column]))
+            .collect();
+        merged_variance(&parts)
+    })
+}
+
+/// Albedo of each channel of colour pictures: least squares over the samples that the normal rests on.
+fn albedo_of_channels(
+    rows: &SignalRows,
+    field: &FieldRow,
+    output: &RowOutput,
+    rgb: &mut [[f32; 3]],
+) {
+    let Some(kept) = &output.kept else { return };
+    for (column, rgb) in rgb.iter_mut().enumerate() {
+        let normal = nalgebra::Vector3::from(output.normal[column]).cast::<f64>();
+        let (mut along, mut square) = ([0.0; 3], 0.0);
+        for light in (0..field.lights).filter(|light| kept[column] >> light & 1 == 1) {
+            let shading = field.at(column, light).dot(&normal);
+            square += shading * shading;
+            for (channel, along) in along.iter_mut().enumerate() {
+                *along += shading * f64::from(rows.planes[light * 3 + channel][column]);
+            }
+        }
+        *rgb = if square > 0.0 { along.map(|sum| (sum / square) as f32) } else { [0.0; 3] };
+    }
+}

@@ -1,0 +1,146 @@
+//! From maps on the mosaic to the maps of a solution: colour, and the grid that was asked for.
+
+use super::maps::{Albedo, Maps, is_solved};
+use crate::instrument::Color;
+use crate::photometry::Outcome;
+use crate::raw::demosaic;
+use nalgebra::Matrix3;
+use rayon::prelude::*;
+use weavelight_calibration::description::{Camera, Image};
+use weavelight_calibration::projection::Projector;
+
+/// The maps of a solution; zero where unsolved.
+pub(crate) struct Finished {
+    /// Unit normals, rig frame.
+    pub(crate) normal: Image<[f32; 3]>,
+    /// Linear RGB.
+    pub(crate) albedo: Image<[f32; 3]>,
+    /// Expected error of the normal, degrees.
+    pub(crate) confidence: Image<f32>,
+    /// 255 where solved.
+    pub(crate) mask: Image<u8>,
+}
+
+/// What R, G, B mean.
+pub(crate) fn color_space(color: &Color) -> &'static str {
+    match color.camera_to_linear_srgb {
+        Some(_) => "linear sRGB",
+        None => "white-balanced camera RGB",
+    }
+}
+
+/// Gives the albedo its hidden channels and the colour space of the calibration.
+pub(crate) fn finish(maps: Maps, color: &Color) -> Finished {
+    let Maps { normal, albedo, expected_error_deg, outcome, .. } = maps;
+    let width = outcome.width;
+    let mask = |outcome: &Outcome| if is_solved(*outcome) { 255 } else { 0 };
+    let mask =
+        Image { width, height: outcome.height, data: outcome.data.par_iter().map(mask).collect() };
+    let mut albedo = match albedo {
+        Albedo::Mosaic(mosaic, cfa) => {
+            demosaic(&mosaic, cfa, &|x, y| mask.data[y * width + x] != 0)
+        }
+        Albedo::Grey(grey) => Image {
+            width,
+            height: grey.height,
+            data: grey.data.par_iter().map(|&value| [value; 3]).collect(),
+        },
+        Albedo::Rgb(rgb) => rgb,
+    };
+    if let Some(matrix) = &color.camera_to_linear_srgb {
+        convert(&mut albedo, matrix);
+    }
+    Finished { normal, albedo, confidence: expected_error_deg, mask }
+}
+
+fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
+    let matrix = matrix.cast::<f32>();
+    albedo
+        .data
+        .par_iter_mut()
+        .for_each(|rgb| *rgb = (matrix * nalgebra::Vector3::from(*rgb)).into());
+}
+
+/// The same camera without its distortion.
+pub(crate) fn pinhole(camera: &Camera) -> Camera {
+    Camera { distortion: [0.0; 5], ..camera.clone() }
+}
+
+/// Resamples the maps to the picture of a camera without distortion. Each pixel is the bilinear mean of the solved ones
+/// around its place; it is solved where they make up at least half.
+pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
+    let (width, height) = (maps.mask.width, maps.mask.height);
+    let projector = Projector::new(camera);
+    let mut out = Finished {
+        normal: Image::filled(width, height, [0.0; 3]),
+        albedo: Image::filled(width, height, [0.0; 3]),
+        confidence: Image::filled(width, height, 0.0),
+        mask: Image::filled(width, height, 0),
+    };
+    let Finished { normal, albedo, confidence, mask } = &mut out;
+    let rows = normal.data.par_chunks_mut(width).zip(albedo.data.par_chunks_mut(width));
+    let rows = rows.zip(confidence.data.par_chunks_mut(width)).zip(mask.data.par_chunks_mut(width));
+    rows.enumerate().for_each(|(v, (((normal, albedo), confidence), mask))| {
+        for u in 0..width {
+            let undistorted =
+                [(u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy];
+            let taps = projector
+                .pixel_of_undistorted(undistorted)
+                .and_then(|pixel| Taps::new(&maps.mask, pixel));
+            let Some(taps) = taps else { continue };
+            let mean_normal = nalgebra::Vector3::from(taps.mean(&maps.normal));
+            let length = mean_normal.norm();
+            if length > 0.0 {
+                normal[u] = (mean_normal / length).into();
+                albedo[u] = taps.mean(&maps.albedo);
+                confidence[u] = taps.mean_of(|at| [maps.confidence.data[at], 0.0, 0.0])[0];
+                mask[u] = 255;
+            }
+        }
+    });
+    out
+}
+
+/// The solved pixels around a place and their shares.
+struct Taps {
+    at: [(usize, f32); 4],
+}
+
+impl Taps {
+    fn new(mask: &Image<u8>, [u, v]: [f64; 2]) -> Option<Self> {
+        let (right, bottom) = ((mask.width - 1) as f64, (mask.height - 1) as f64);
+        // Half a pixel beyond the outermost centres still lies on the sensor.
+        if !(-0.5..=right + 0.5).contains(&u) || !(-0.5..=bottom + 0.5).contains(&v) {
+            return None;
+        }
+        let (u, v) = (u.clamp(0.0, right), v.clamp(0.0, bottom));
+        let (x, y) = (u.floor() as usize, v.floor() as usize);
+        let (fu, fv) = ((u - x as f64) as f32, (v - y as f64) as f32);
+        let tap = |dx: usize, dy: usize, weight: f32| {
+            let at = (y + dy).min(mask.height - 1) * mask.width + (x + dx).min(mask.width - 1);
+            (at, if mask.data[at] == 0 { 0.0 } else { weight })
+        };
+        let mut at = [
+            tap(0, 0, (1.0 - fu) * (1.0 - fv)),
+            tap(1, 0, fu * (1.0 - fv)),
+            tap(0, 1, (1.0 - fu) * fv),
+            tap(1, 1, fu * fv),
+        ];
+        let total: f32 = at.iter().map(|(_, weight)| weight).sum();
+        at.iter_mut().for_each(|(_, weight)| *weight /= total);
+        (total >= 0.5).then_some(Self { at })
+    }
+
+    fn mean(&self, image: &Image<[f32; 3]>) -> [f32; 3] {
+        self.mean_of(|at| image.data[at])
+    }
+
+    fn mean_of(&self, value: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
+        let mut sum = [0.0; 3];
+        for (at, weight) in self.at {
+            let value = value(at);
+            sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight * value);
+        }
+        sum
+    }
+}

@@ -1,0 +1,64 @@
+//! The middle of the run: from decoded frames to maps, without a file.
+
+use super::SolveError;
+use super::bands::Run;
+use super::check::{check_frames, check_light_field};
+use super::field::LightField;
+use super::maps::Maps;
+use super::noise::{LinearNoise, full_scale};
+use super::progress::{Progress, Stage};
+use super::scene::Scene;
+use crate::instrument::{CAMERA_FILE, Noise};
+use crate::photometry::Method;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Noise that is assumed where neither the calibration nor the residuals tell: a full well of 40 000 electrons in
+/// 14 bits, 4 electrons of read noise, a light model good to half a percent.
+const TYPICAL_FULL_WELL_E: f64 = 40_000.0;
+const TYPICAL_READ_NOISE_E: f64 = 4.0;
+const TYPICAL_KAPPA: f64 = 0.005;
+
+/// Solves a scene on the current thread pool: maps and warnings.
+///
+/// # Errors
+/// Where the frames, the lights and the camera do not belong together or say too little.
+pub fn solve_scene(
+    scene: &Scene,
+    method: Method,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<(Maps, Vec<String>), SolveError> {
+    check_frames(scene)?;
+    let field = light_field(scene)?;
+    let warnings = check_light_field(scene, &field)?;
+    let run = Run::new(scene, &field, noise(scene), method);
+    let rows = AtomicUsize::new(0);
+    let total = scene.height;
+    let maps = run.solve(&|finished| {
+        let done = rows.fetch_add(finished, Ordering::Relaxed) + finished;
+        progress(Progress { stage: Stage::Solve, done, total });
+    });
+    Ok((maps, warnings))
+}
+
+/// The light field of a scene's lights.
+pub(crate) fn light_field(scene: &Scene) -> Result<LightField<'_>, SolveError> {
+    let lights = scene.lights.iter().map(|light| &light.calibrated.light).collect();
+    LightField::new(lights, scene.camera.as_ref(), &scene.plane, scene.size_px()).map_err(
+        |unseen| SolveError::Unseen {
+            calibration: scene.origin.calibration.join(CAMERA_FILE),
+            u: unseen.pixel[0],
+            v: unseen.pixel[1],
+        },
+    )
+}
+
+/// The sensor's noise.
+pub(crate) fn noise(scene: &Scene) -> LinearNoise {
+    let range = full_scale(scene);
+    let typical = Noise {
+        electrons_per_dn: TYPICAL_FULL_WELL_E / range,
+        read_noise_e: TYPICAL_READ_NOISE_E,
+        kappa: TYPICAL_KAPPA,
+    };
+    LinearNoise::from_electrons(scene.color.noise.as_ref().unwrap_or(&typical), range)
+}

@@ -1,0 +1,231 @@
+//! From two folders to a scene in memory.
+
+use super::drift::drift_warnings;
+use super::progress::{Progress, Stage};
+use super::scene::{Exposure, Origin, PhotographedLight, Scene};
+use super::{Options, SolveError};
+use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE};
+use crate::raster::{Values, decode_picture};
+use crate::raw::{Encoding, Frame, Hint, ReadError, decode};
+use crate::session::{self, FrameEntry, Kind, Session};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use weavelight_calibration::description::{Image, Light};
+
+/// Files held in memory at once beside the decoded frames: enough to keep cores busy, few enough for the memory bound.
+const FILES_AT_ONCE: usize = 4;
+/// Exposures of one light that can be merged.
+const MOST_EXPOSURES: usize = 64;
+
+/// A scene and what reading it had to say.
+pub(crate) struct Loaded {
+    pub(crate) scene: Scene,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// Reads and checks everything that can be checked before solving.
+pub(crate) fn load(
+    options: &Options,
+    session: &Session,
+    calibration: Calibration,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Loaded, SolveError> {
+    check_folders(session, &calibration)?;
+    let mut warnings = unphotographed(session, &calibration);
+    let frames = read_frames(session, progress)?;
+    let (drift, frames): (Vec<_>, Vec<_>) =
+        session.frames.iter().zip(frames).partition(|(entry, _)| entry.drift_check);
+    let mut scene = arrange(session, calibration, frames);
+    super::check::check_frames(&scene)?;
+    let drift: Vec<_> = drift
+        .into_iter()
+        .map(|(entry, frame)| (entry.light, exposure(session, entry, frame)))
+        .collect();
+    warnings.extend(drift_warnings(&scene, &drift));
+    let mask = options.mask.clone().or_else(|| session.mask_path());
+    scene.mask = mask.map(|path| read_mask(&path, &scene)).transpose()?;
+    Ok(Loaded { scene, warnings })
+}
+
+fn check_folders(session: &Session, calibration: &Calibration) -> Result<(), SolveError> {
+    if session.kind == Kind::Board {
+        return Err(SolveError::Board { session: session.manifest_path() });
+    }
+    if calibration.lights.is_empty() {
+        return Err(SolveError::NoLights { calibration: calibration.folder.join(LIGHTS_FILE) });
+    }
+    session.check_lights(calibration.lights.len())?;
+    check_counts(session)?;
+    let near = |index: usize| matches!(calibration.lights[index].light, Light::Point(_));
+    if calibration.camera.is_none() && photographed(session).into_iter().any(near) {
+        return Err(SolveError::NoCamera { calibration: calibration.folder.join(CAMERA_FILE) });
+    }
+    session.check_files()?;
+    Ok(())
+}
+
+fn check_counts(session: &Session) -> Result<(), SolveError> {
+    let lights = photographed(session);
+    if lights.len() < 3 {
+        return Err(SolveError::TooFewLights {
+            session: session.manifest_path(),
+            found: lights.len(),
+        });
+    }
+    for light in lights {
+        let found =
+            session.frames.iter().filter(|f| f.light == Some(light) && !f.drift_check).count();
+        if found > MOST_EXPOSURES {
+            return Err(SolveError::TooManyExposures {
+                session: session.manifest_path(),
+                light,
+                found,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Lights with a frame that counts, ascending.
+fn photographed(session: &Session) -> Vec<usize> {
+    let counting = session.frames.iter().filter(|frame| !frame.drift_check);
+    let mut lights: Vec<usize> = counting.filter_map(|frame| frame.light).collect();
+    lights.sort_unstable();
+    lights.dedup();
+    lights
+}
+
+fn unphotographed(session: &Session, calibration: &Calibration) -> Vec<String> {
+    let there = photographed(session);
+    let missing: Vec<String> = (0..calibration.lights.len())
+        .filter(|light| !there.contains(light))
+        .map(|light| light.to_string())
+        .collect();
+    match missing.as_slice() {
+        [] => vec![],
+        [one] => vec![format!("Light {one} has no frame; solved with the other {}.", there.len())],
+        several => {
+            let names = super::check::in_words(several);
+            vec![format!("Lights {names} have no frames; solved with the other {}.", there.len())]
+        }
+    }
+}
+
+/// Decodes every frame, several at once; in the manifest's order.
+fn read_frames(
+    session: &Session,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Vec<Frame>, SolveError> {
+    let finished = AtomicUsize::new(0);
+    let total = session.frames.len();
+    let read = |entry: &FrameEntry| {
+        let frame = read_frame(session, entry);
+        let done = finished.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(Progress { stage: Stage::Read, done, total });
+        frame
+    };
+    let at_once = FILES_AT_ONCE.min(rayon::current_num_threads().max(1));
+    let mut frames = Vec::with_capacity(total);
+    for group in session.frames.chunks(at_once) {
+        let decoded: Vec<Result<Frame, SolveError>> =
+            group.par_iter().with_max_len(1).map(read).collect();
+        for frame in decoded {
+            frames.push(frame?);
+        }
+    }
+    Ok(frames)
+}
+
+fn read_frame(session: &Session, entry: &FrameEntry) -> Result<Frame, SolveError> {
+    let bytes = session.read_frame(entry)?;
+    let encoding = entry.encoding.map(|encoding| match encoding {
+        session::Encoding::Linear => Encoding::Linear,
+        session::Encoding::Srgb => Encoding::Srgb,
+    });
+    decode(&bytes, &Hint { cfa: entry.cfa, encoding })
+        .map_err(|source| ReadError::Decode { path: session.frame_path(entry), source }.into())
+}
+
+fn exposure(session: &Session, entry: &FrameEntry, frame: Frame) -> Exposure {
+    Exposure {
+        frame,
+        exposure_s: entry.exposure_s,
+        iso: entry.iso,
+        path: session.frame_path(entry),
+    }
+}
+
+/// Frames by light and exposure, so that nothing depends on their order in the manifest.
+fn arrange(
+    session: &Session,
+    calibration: Calibration,
+    frames: Vec<(&FrameEntry, Frame)>,
+) -> Scene {
+    let (width, height, layout) = frames
+        .first()
+        .map_or((0, 0, crate::raw::Layout::Grey), |(_, f)| (f.width, f.height, f.layout));
+    let mut ambient = vec![];
+    let mut of_lights: Vec<Vec<Exposure>> = calibration.lights.iter().map(|_| vec![]).collect();
+    for (entry, frame) in frames {
+        let exposure = exposure(session, entry, frame);
+        match entry.light {
+            Some(light) => of_lights[light].push(exposure),
+            None => ambient.push(exposure),
+        }
+    }
+    let in_order = |exposures: &mut Vec<Exposure>| {
+        exposures.sort_by(|a, b| {
+            let seconds = a.seconds_at_iso_100().total_cmp(&b.seconds_at_iso_100());
+            seconds.then(a.iso.total_cmp(&b.iso)).then_with(|| a.path.cmp(&b.path))
+        });
+    };
+    in_order(&mut ambient);
+    of_lights.iter_mut().for_each(in_order);
+    let lights = calibration.lights.into_iter().zip(of_lights).enumerate();
+    Scene {
+        width,
+        height,
+        layout,
+        lights: lights
+            .filter(|(_, (_, exposures))| !exposures.is_empty())
+            .map(|(index, (calibrated, exposures))| PhotographedLight {
+                index,
+                calibrated,
+                exposures,
+            })
+            .collect(),
+        ambient,
+        camera: calibration.camera,
+        plane: session.plane_or_table(),
+        color: calibration.color,
+        mask: None,
+        origin: Origin { session: session.manifest_path(), calibration: calibration.folder },
+    }
+}
+
+/// Any picture of the frames' size; what is not black is inside.
+fn read_mask(path: &Path, scene: &Scene) -> Result<Image<bool>, SolveError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| crate::files::FileError::read(path, source))?;
+    let picture = decode_picture(&bytes)
+        .map_err(|source| ReadError::Decode { path: path.to_owned(), source: source.into() })?;
+    if (picture.width, picture.height) != scene.size_px() {
+        return Err(SolveError::OtherMask {
+            path: path.to_owned(),
+            mask: format!("{} x {}", picture.width, picture.height),
+            frames: format!("{} x {}", scene.width, scene.height),
+        });
+    }
+    let bright: Vec<bool> = match &picture.values {
+        Values::U8(values) => values.iter().map(|&v| v != 0).collect(),
+        Values::U16(values) => values.iter().map(|&v| v != 0).collect(),
+        Values::F32(values) => values.iter().map(|&v| v > 0.0).collect(),
+    };
+    let data: Vec<bool> =
+        bright.chunks_exact(picture.channels).map(|pixel| pixel.contains(&true)).collect();
+    if !data.contains(&true) {
+        return Err(SolveError::EmptyMask { path: path.to_owned() });
+    }
+    Ok(Image { width: scene.width, height: scene.height, data })
+}

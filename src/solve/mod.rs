@@ -1,0 +1,35 @@
+//! The run: a capture session and a calibration become a solution.
+//!
+//! [`run`] reads frames, checks that they and the calibration belong together, solves in bands of rows over threads,
+//! finds the colour of the albedo and writes the folder. [`solve_scene`] is the middle of it, in memory.
+
+mod bands;
+mod check;
+mod drift;
+mod encode;
+mod error;
+mod field;
+mod finish;
+mod gain;
+mod in_memory;
+mod load;
+mod maps;
+mod noise;
+mod options;
+mod progress;
+#[cfg(test)]
+mod reference;
+mod run;
+mod scene;
+mod sensor;
+mod signal;
+#[cfg(test)]
+mod tests;
+
+pub use error::SolveError;
+pub use in_memory::solve_scene;
+pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
+pub use options::{Grid, NormalY, Options};
+pub use progress::{Progress, Stage};
+pub use run::{method_name, run};
+pub use scene::{Exposure, Origin, PhotographedLight, Scene};

@@ -1,0 +1,215 @@
+//! The whole run, from folders to a folder.
+
+use super::SolveError;
+use super::encode::write_maps;
+use super::finish::{Finished, color_space, finish, pinhole, undistort};
+use super::in_memory::solve_scene;
+use super::load::{Loaded, load};
+use super::maps::Counts;
+use super::options::{Grid, Options};
+use super::progress::{Progress, Stage};
+use super::scene::Scene;
+use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file};
+use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE, write_camera};
+use crate::photometry::{Method, Outcome};
+use crate::session::Session;
+use crate::solution::{OUTPUT, PlaneReport, REPORT_JSON, Report};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+use weavelight_calibration::description::{Camera, Plane};
+use weavelight_calibration::projection::Projector;
+
+/// Solves a capture session and writes the solution's folder; nothing stands under its name before it is whole.
+///
+/// The same inputs give the same maps, byte for byte, whatever the number of threads and the order of the frames.
+///
+/// # Errors
+/// [`SolveError`] names the file and the remedy; nothing is left behind then.
+pub fn run(options: &Options, progress: &(dyn Fn(Progress) + Sync)) -> Result<Report, SolveError> {
+    let threads = options.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| SolveError::Threads { threads, source })?;
+    pool.install(|| run_on_this_pool(options, progress))
+}
+
+fn run_on_this_pool(
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Report, SolveError> {
+    let mut watch = Stopwatch::start();
+    let session = Session::load(&options.session)?;
+    let calibration = Calibration::load(&options.calibration)?;
+    if options.grid == Grid::Undistorted && calibration.camera.is_none() {
+        return Err(SolveError::NothingToUndistort { calibration: calibration.folder });
+    }
+    let inputs = inputs(&session, &calibration)?;
+    // Before the work: a place that cannot be written is told at once.
+    let staged = StagedFolder::create(&options.out, OUTPUT)?;
+    let Loaded { scene, mut warnings } = load(options, &session, calibration, progress)?;
+    watch.lap(Stage::Read);
+    let (maps, of_solve) = solve_scene(&scene, options.method, progress)?;
+    warnings.extend(of_solve);
+    watch.lap(Stage::Solve);
+    let rest = Rest::of(scene);
+    let counts = maps.counts;
+    let finished = on_grid(finish(maps, &rest.color), rest.camera.as_ref(), options.grid);
+    watch.lap(Stage::Colour);
+    write_maps(staged.path(), &finished, options.normal_y, progress)?;
+    copy_camera(&rest, options, staged.path())?;
+    watch.lap(Stage::Write);
+    let report = report(options, &rest, &finished, counts, watch, warnings, inputs);
+    report.write(&staged.join(REPORT_JSON))?;
+    staged.commit()?;
+    Ok(report)
+}
+
+/// What is still needed of a scene when its frames are not: they make room for the files being encoded.
+struct Rest {
+    camera: Option<Camera>,
+    calibrated_camera: std::path::PathBuf,
+    plane: Plane,
+    color: crate::instrument::Color,
+    lights_used: Vec<usize>,
+    pixels: usize,
+}
+
+impl Rest {
+    fn of(scene: Scene) -> Self {
+        Self {
+            lights_used: scene.lights.iter().map(|light| light.index).collect(),
+            pixels: scene.width * scene.height,
+            calibrated_camera: scene.origin.calibration.join(CAMERA_FILE),
+            camera: scene.camera,
+            plane: scene.plane,
+            color: scene.color,
+        }
+    }
+}
+
+fn on_grid(maps: Finished, camera: Option<&Camera>, grid: Grid) -> Finished {
+    match (grid, camera) {
+        (Grid::Undistorted, Some(camera)) => undistort(&maps, camera),
+        _ => maps,
+    }
+}
+
+/// The camera that the maps' pixels belong to: the calibration's file as it is, or without its distortion.
+fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), SolveError> {
+    let Some(camera) = &rest.camera else { return Ok(()) };
+    let target = folder.join(CAMERA_FILE);
+    match options.grid {
+        Grid::Sensor => {
+            let copied = std::fs::copy(&rest.calibrated_camera, &target);
+            copied.map_err(|source| crate::files::FileError::write(&target, source))?;
+        }
+        Grid::Undistorted => write_camera(folder, &pinhole(camera), None, &Default::default())?,
+    }
+    Ok(())
+}
+
+fn report(
+    options: &Options,
+    rest: &Rest,
+    maps: &Finished,
+    counts: Counts,
+    watch: Stopwatch,
+    warnings: Vec<String>,
+    inputs: Vec<Input>,
+) -> Report {
+    let undistorted = options.grid == Grid::Undistorted;
+    let camera = rest
+        .camera
+        .as_ref()
+        .map(|camera| if undistorted { pinhole(camera) } else { camera.clone() });
+    Report {
+        schema: SCHEMA,
+        program: PROGRAM.to_owned(),
+        method: method_name(options.method).to_owned(),
+        size_px: [maps.mask.width, maps.mask.height],
+        lights_used: rest.lights_used.clone(),
+        pixels: rest.pixels as u64,
+        solved: maps.mask.data.iter().filter(|&&solved| solved != 0).count() as u64,
+        robust_pixels: counts.robust() as u64,
+        saturated_pixels: counts.saturated as u64,
+        outcomes: outcomes(&counts),
+        residual_rms: (counts.solved() > 0).then(|| counts.residual_rms()),
+        seconds: watch.seconds,
+        mm_per_px: camera.and_then(|camera| mm_per_px(&camera, &rest.plane)),
+        undistorted,
+        plane: PlaneReport {
+            point_mm: rest.plane.point_mm.coords.into(),
+            normal: rest.plane.normal.into_inner().into(),
+        },
+        color_space: color_space(&rest.color).to_owned(),
+        warnings,
+        inputs,
+        key: None,
+    }
+}
+
+/// As the command line calls it.
+pub fn method_name(method: Method) -> &'static str {
+    match method {
+        Method::LeastSquares => "least-squares",
+        Method::Weighted => "weighted",
+        Method::Robust => "robust",
+        Method::Auto => "auto",
+    }
+}
+
+fn outcomes(counts: &Counts) -> BTreeMap<String, u64> {
+    let names = [
+        (Outcome::Fitted, "fitted"),
+        (Outcome::Shadow, "shadow"),
+        (Outcome::Highlight, "highlight"),
+        (Outcome::Other, "other"),
+        (Outcome::TooFewLights, "too_few_lights"),
+        (Outcome::CoplanarLights, "coplanar_lights"),
+        (Outcome::NoSurface, "no_surface"),
+        (Outcome::Masked, "masked"),
+    ];
+    names.into_iter().map(|(outcome, name)| (name.to_owned(), counts.of(outcome) as u64)).collect()
+}
+
+/// Side of the square on the plane that the picture's middle pixel sees the area of.
+fn mm_per_px(camera: &Camera, plane: &Plane) -> Option<f64> {
+    let projector = Projector::new(camera);
+    let (u, v) = ((camera.width_px - 1) as f64 / 2.0, (camera.height_px - 1) as f64 / 2.0);
+    let at = |du: f64, dv: f64| projector.on_plane([u + du, v + dv], plane);
+    let across = at(0.5, 0.0)? - at(-0.5, 0.0)?;
+    let down = at(0.0, 0.5)? - at(0.0, -0.5)?;
+    Some(across.cross(&down).norm().sqrt())
+}
+
+fn inputs(session: &Session, calibration: &Calibration) -> Result<Vec<Input>, SolveError> {
+    let files = [CAMERA_FILE, COLOR_FILE, LIGHTS_FILE].map(|name| calibration.folder.join(name));
+    let files = std::iter::once(session.manifest_path()).chain(files).filter(|path| path.exists());
+    let input = |path: std::path::PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Input { name, sha256: sha256_of_file(&path)? })
+    };
+    files.map(input).collect()
+}
+
+/// Seconds per stage.
+struct Stopwatch {
+    begun: Instant,
+    lap: Instant,
+    seconds: BTreeMap<String, f64>,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        let now = Instant::now();
+        Self { begun: now, lap: now, seconds: BTreeMap::new() }
+    }
+
+    fn lap(&mut self, stage: Stage) {
+        self.seconds.insert(stage.name().to_owned(), self.lap.elapsed().as_secs_f64());
+        self.lap = Instant::now();
+        self.seconds.insert("total".to_owned(), self.begun.elapsed().as_secs_f64());
+    }
+}

@@ -1,0 +1,127 @@
+mod folders;
+mod scenes;
+
+use super::bands::Run;
+use super::in_memory::{light_field, noise};
+use super::reference::solve_exactly;
+use super::*;
+use crate::photometry::{Method, Outcome, Pixel};
+use crate::raw::Layout;
+use nalgebra::Vector3;
+use scenes::{Recipe, albedo_at, normal_at, scene};
+use weavelight_calibration::description::Cfa;
+
+/// What the project asks of the fast path against float64 evaluated at every pixel.
+const SAME_NORMAL_DEG: f64 = 1e-3;
+/// float32 keeps seven digits; the light field's grid is good to 1e-5.
+const SAME_ALBEDO: f64 = 5e-5;
+
+fn solve(scene: &Scene, method: Method) -> Maps {
+    solve_scene(scene, method, &|_| {}).expect("the scene can be solved").0
+}
+
+fn angle_deg(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b)).to_degrees()
+}
+
+fn own_albedo(maps: &Maps, x: usize, y: usize) -> Option<f64> {
+    match &maps.albedo {
+        Albedo::Mosaic(image, _) | Albedo::Grey(image) => Some(f64::from(*image.at(x, y))),
+        Albedo::Rgb(_) => None,
+    }
+}
+
+/// Every pixel of the fast run beside the exact one.
+fn check_against_reference(recipe: Recipe, method: Method) {
+    let scene = scene(recipe);
+    let maps = solve(&scene, method);
+    let field = light_field(&scene).unwrap();
+    let run = Run::new(&scene, &field, noise(&scene), method);
+    let (mut fitted, mut worst) = (0, 0.0_f64);
+    for y in 0..scene.height {
+        for x in 0..scene.width {
+            let outcome = *maps.outcome.at(x, y);
+            let Pixel::Fitted(fit) = solve_exactly(&run, x, y).unwrap() else {
+                assert!(
+                    !is_solved(outcome),
+                    "{recipe:?} {method:?} ({x}, {y}): {outcome:?} without a reference"
+                );
+                continue;
+            };
+            assert_eq!(outcome, fit.outcome, "{recipe:?} {method:?} ({x}, {y})");
+            let normal = Vector3::from(*maps.normal.at(x, y)).cast::<f64>();
+            worst = worst.max(angle_deg(&normal, &fit.normal));
+            if let Some(albedo) = own_albedo(&maps, x, y) {
+                let off = (albedo - fit.albedo).abs() / fit.albedo;
+                assert!(
+                    off < SAME_ALBEDO,
+                    "{recipe:?} {method:?} ({x}, {y}): albedo off by {off:e}"
+                );
+            }
+            let expected = fit.expected_error.to_degrees();
+            let off = (f64::from(*maps.expected_error_deg.at(x, y)) - expected).abs() / expected;
+            assert!(off < 1e-3, "{recipe:?} {method:?} ({x}, {y}): expected error off by {off:e}");
+            fitted += 1;
+        }
+    }
+    assert!(worst <= SAME_NORMAL_DEG, "{recipe:?} {method:?}: {worst:e} degrees off");
+    assert!(fitted > scene.width * scene.height / 2, "{recipe:?} {method:?}: only {fitted} fitted");
+}
+
+#[test]
+fn the_fast_run_agrees_with_float64_at_every_pixel() {
+    let plain = Recipe::default();
+    let all = Recipe { gain_maps: true, ambient: true, bent_response: true, ..plain };
+    for method in [Method::LeastSquares, Method::Weighted] {
+        check_against_reference(plain, method);
+        check_against_reference(Recipe { seed: 2, ..all }, method);
+        check_against_reference(Recipe { seed: 3, exposures: 3, ..all }, method);
+        check_against_reference(Recipe { seed: 4, layout: Layout::Rgb, ..all }, method);
+        check_against_reference(Recipe { seed: 5, layout: Layout::Grey, ..all }, method);
+        check_against_reference(Recipe { seed: 6, directional: true, ..plain }, method);
+        check_against_reference(Recipe { seed: 7, lights: 3, ..plain }, method);
+        check_against_reference(
+            Recipe { seed: 8, lights: 64, width: 21, height: 9, ..plain },
+            method,
+        );
+        check_against_reference(
+            Recipe { seed: 9, mm_per_px: 0.08, width: 131, height: 70, ..plain },
+            method,
+        );
+        check_against_reference(
+            Recipe { seed: 10, layout: Layout::Mosaic(Cfa::parse("GBRG").unwrap()), ..plain },
+            method,
+        );
+    }
+}
+
+#[test]
+fn the_truth_comes_back() {
+    let recipe =
+        Recipe { gain_maps: true, ambient: true, bent_response: true, ..Recipe::default() };
+    let scene = scene(recipe);
+    let maps = solve(&scene, Method::Weighted);
+    let Albedo::Mosaic(albedo, cfa) = &maps.albedo else { panic!("a mosaic gives a mosaic") };
+    let mut errors = vec![];
+    for y in 0..scene.height {
+        for x in 0..scene.width {
+            let normal = Vector3::from(*maps.normal.at(x, y)).cast::<f64>();
+            errors.push(angle_deg(&normal, &normal_at(x, y)));
+            let expected = albedo_at(x, y)[cfa.channel(x, y) as usize];
+            let off = f64::from(*albedo.at(x, y)) / expected - 1.0;
+            assert!(off.abs() < 0.01, "({x}, {y}): albedo off by {off}");
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let median = errors[errors.len() / 2];
+    // Only rounding to 16 bits stands between the frames and the truth.
+    assert!(median < 0.02, "median {median} degrees");
+    assert!(*errors.last().unwrap() < 0.5, "worst {} degrees", errors.last().unwrap());
+}
+
+#[test]
+fn one_pixel_is_a_picture() {
+    let maps = solve(&scene(Recipe { width: 1, height: 1, ..Recipe::default() }), Method::Weighted);
+    assert_eq!(maps.counts.solved(), 1);
+    assert_eq!(maps.counts.of(Outcome::Fitted), 1);
+}
