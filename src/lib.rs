@@ -12,6 +12,9 @@
 //! - [`simulate`]: the simulated rig's folders
 //! - [`report`]: what a command tells
 
+pub mod cli;
+pub mod compare;
+pub mod doctor;
 pub mod files;
 pub mod instrument;
 pub mod photometry;

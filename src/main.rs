@@ -1,3 +1,5 @@
 //! The `weavelight` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    weavelight::cli::main()
+}

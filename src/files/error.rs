@@ -66,15 +66,13 @@ pub enum FileError {
         /// What does not fit.
         what: String,
     },
-    /// The output folder already holds something else.
-    #[error("{}: holds {found}, which is no earlier {kind}; choose an empty or new folder with --out", .path.display())]
+    /// The output folder holds something that is not ours to replace.
+    #[error("{}: {what}; choose an empty or new folder with --out", .path.display())]
     Occupied {
         /// The folder.
         path: PathBuf,
-        /// A file or folder in it.
-        found: String,
-        /// What was to be written.
-        kind: &'static str,
+        /// What is in the way, and why it stays.
+        what: String,
     },
 }
 

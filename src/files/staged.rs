@@ -136,7 +136,7 @@ fn check_free(target: &Path, kind: OutputKind) -> Result<(), FileError> {
         Ok(entries) => entries,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
         Err(error) if error.kind() == io::ErrorKind::NotADirectory && target.is_file() => {
-            return Err(occupied(target, "a file of this name", kind));
+            return Err(occupied(target, "is a file".to_owned()));
         }
         Err(error) => return Err(FileError::write(target, error)),
     };
@@ -146,14 +146,23 @@ fn check_free(target: &Path, kind: OutputKind) -> Result<(), FileError> {
         .collect();
     let finished = kind.marker.is_some_and(|marker| names.iter().any(|name| name == marker));
     let foreign = names.iter().filter(|name| !finished || !kind.owns(name)).min();
-    match foreign {
-        Some(name) => Err(occupied(target, name, kind)),
-        None => Ok(()),
+    match (foreign, kind.marker) {
+        (None, _) => Ok(()),
+        (Some(name), Some(_)) => {
+            let what = format!(
+                "holds {name}; only an earlier {} and nothing else would be replaced",
+                kind.name
+            );
+            Err(occupied(target, what))
+        }
+        (Some(name), None) => {
+            Err(occupied(target, format!("holds {name}; a {} is never replaced", kind.name)))
+        }
     }
 }
 
-fn occupied(target: &Path, found: &str, kind: OutputKind) -> FileError {
-    FileError::Occupied { path: target.to_owned(), found: found.to_owned(), kind: kind.name }
+fn occupied(target: &Path, what: String) -> FileError {
+    FileError::Occupied { path: target.to_owned(), what }
 }
 
 fn make_parents(parent: &Path) -> Result<Vec<PathBuf>, FileError> {
@@ -239,8 +248,11 @@ mod tests {
         check(&[], "report.json");
         check(&["/"], "report.json");
         check(&["report.json", "tilt-3", "a"], "report.json");
-        check(&["report.json", "thesis.tex"], "holds thesis.tex, which is no earlier solution");
-        check(&["a"], "holds a, which is no earlier solution");
+        check(
+            &["report.json", "thesis.tex"],
+            "holds thesis.tex; only an earlier solution and nothing else",
+        );
+        check(&["a"], "holds a; only an earlier solution");
     }
 
     #[test]
@@ -263,7 +275,7 @@ mod tests {
         let target = home.path().join("out");
         fs::write(&target, "mine").unwrap();
         let error = StagedFolder::create(&target, KIND).unwrap_err().to_string();
-        assert!(error.contains("holds a file of this name"), "{error}");
+        assert!(error.contains("out: is a file; choose"), "{error}");
         assert_eq!(fs::read_to_string(target).unwrap(), "mine");
     }
 }

@@ -5,6 +5,7 @@ mod check;
 mod error;
 mod format;
 mod frames;
+pub mod import;
 #[cfg(test)]
 mod tests;
 mod writer;
@@ -98,7 +99,7 @@ pub struct FrameEntry {
     pub iso: f64,
     /// SHA-256 of the file, lower-case hexadecimal.
     pub sha256: Option<String>,
-    /// Encoding of 8-bit pictures.
+    /// How the picture encodes light; 8-bit pictures must say, others are linear where it is absent.
     pub encoding: Option<Encoding>,
     /// Mosaic pattern of a picture that cannot say so itself.
     pub cfa: Option<Cfa>,
@@ -118,7 +119,7 @@ pub struct FrameEntry {
     pub drift_check: bool,
 }
 
-/// How an 8-bit picture encodes light.
+/// How a picture encodes light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Proportional.

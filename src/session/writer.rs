@@ -18,10 +18,8 @@ impl SessionWriter {
         let folder = &session.folder;
         std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
         if folder.join(MANIFEST).exists() {
-            let found = MANIFEST.to_owned();
-            return Err(
-                FileError::Occupied { path: folder.clone(), found, kind: "empty folder" }.into()
-            );
+            let what = "holds a capture session already".to_owned();
+            return Err(FileError::Occupied { path: folder.clone(), what }.into());
         }
         session.save()?;
         Ok(Self { session })

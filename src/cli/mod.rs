@@ -1,0 +1,59 @@
+//! The command line: parse, call, print. One file per command; each calls one library function and says what came of it.
+//!
+//! Exit status: 0 done, 1 the work failed, 2 the call was wrong.
+
+mod compare;
+mod doctor;
+mod gui;
+mod import;
+mod output;
+mod progress;
+#[cfg(test)]
+mod tests;
+
+use clap::{Parser, Subcommand};
+use output::{Failure, Output};
+use std::process::ExitCode;
+
+/// Fabric scanner: normal and albedo maps from photographs under one light at a time.
+#[derive(Debug, Parser)]
+#[command(name = "weavelight", version, propagate_version = true, arg_required_else_help = true)]
+struct Cli {
+    /// Print one JSON object on standard output instead of text
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Import(import::Args),
+    Compare(compare::Args),
+    Doctor(doctor::Args),
+    Gui(gui::Args),
+}
+
+impl Command {
+    fn run(&self) -> Result<Output, Failure> {
+        match self {
+            Command::Import(args) => import::run(args),
+            Command::Compare(args) => compare::run(args),
+            Command::Doctor(args) => doctor::run(args),
+            Command::Gui(args) => gui::run(args),
+        }
+    }
+}
+
+/// Runs the command that the process was called with, prints what it says, and returns the exit status.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are no failures and go to standard output; a closed pipe is nobody's concern.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { output::CALL_WRONG } else { 0 });
+        }
+    };
+    output::finish(cli.command.run(), cli.json)
+}

@@ -1,0 +1,72 @@
+//! What a command says, and where.
+
+use std::fmt::Display;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Exit status of work that failed.
+pub(super) const WORK_FAILED: u8 = 1;
+/// Exit status of a call that was wrong.
+pub(super) const CALL_WRONG: u8 = 2;
+
+/// What a command that did its work has to say.
+#[derive(Debug, Default)]
+pub(super) struct Output {
+    /// For people, on standard output.
+    pub(super) text: String,
+    /// For programs: one object, on standard output with `--json`.
+    pub(super) json: serde_json::Value,
+    /// Sentences, on standard error either way.
+    pub(super) warnings: Vec<String>,
+    /// Exit status; 0 but for commands that pass on another program's.
+    pub(super) status: u8,
+}
+
+/// Why a command did not do its work.
+#[derive(Debug)]
+pub(super) struct Failure {
+    message: String,
+    status: u8,
+}
+
+impl Failure {
+    /// The call was right, but the work failed.
+    pub(super) fn work(error: impl Display) -> Self {
+        Self { message: error.to_string(), status: WORK_FAILED }
+    }
+
+    /// The call was wrong.
+    pub(super) fn call(error: impl Display) -> Self {
+        Self { message: error.to_string(), status: CALL_WRONG }
+    }
+}
+
+/// Prints and returns the exit status.
+pub(super) fn finish(result: Result<Output, Failure>, json: bool) -> ExitCode {
+    match result {
+        Ok(output) => {
+            for warning in &output.warnings {
+                to_stderr(&format!("warning: {warning}"));
+            }
+            let text = if json { output.json.to_string() } else { output.text };
+            to_stdout(&text);
+            ExitCode::from(output.status)
+        }
+        Err(failure) => {
+            to_stderr(&format!("error: {}", failure.message));
+            ExitCode::from(failure.status)
+        }
+    }
+}
+
+/// A reader that stopped listening (`weavelight ... | head`) is no failure of the work, so errors are let go.
+fn to_stdout(text: &str) {
+    let text = text.trim_end();
+    if !text.is_empty() {
+        let _ = writeln!(std::io::stdout().lock(), "{text}");
+    }
+}
+
+fn to_stderr(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{}", text.trim_end());
+}

@@ -1,0 +1,34 @@
+//! A bar on standard error, and only on a terminal.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+/// Steps of the bar: fine enough that it does not jump.
+const STEPS: u64 = 1000;
+
+/// How far a command is.
+pub(super) struct Progress(ProgressBar);
+
+impl Progress {
+    pub(super) fn new() -> Self {
+        // The draw target stays silent where standard error is no terminal.
+        let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}") {
+            bar.set_style(style);
+        }
+        Self(bar)
+    }
+
+    /// `share` of the work is done, 0 to 1; `what` is going on.
+    pub(super) fn set(&self, share: f64, what: &str) {
+        self.0.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        if self.0.message() != what {
+            self.0.set_message(what.to_owned());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

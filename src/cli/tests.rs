@@ -1,0 +1,46 @@
+use super::*;
+use clap::CommandFactory;
+
+#[test]
+fn the_command_line_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn every_command_has_an_example() {
+    for command in Cli::command().get_subcommands() {
+        let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let example = format!("weavelight {}", command.get_name());
+        assert!(
+            help.starts_with("Example:") && help.contains(&example),
+            "{}: {help}",
+            command.get_name()
+        );
+    }
+}
+
+#[test]
+fn calls_are_understood_or_refused() {
+    let check = |call: &str, understood: bool| {
+        let found = Cli::try_parse_from(call.split_whitespace());
+        assert_eq!(
+            found.is_ok(),
+            understood,
+            "{call}: {:?}",
+            found.err().map(|error| error.to_string())
+        );
+    };
+    check("weavelight compare a.exr b.exr --json", true);
+    check("weavelight --json compare a.exr b.exr --kind normal --mask m.png", true);
+    check("weavelight compare a.exr", false);
+    check("weavelight compare a.exr b.exr --kind height", false);
+    check("weavelight import --lights l.lp --out s", true);
+    check(
+        "weavelight import --lights l.txt a.png b.png c.png --out s --encoding srgb --mask m.png",
+        true,
+    );
+    check("weavelight import a.png --out s", false);
+    check("weavelight doctor", true);
+    check("weavelight gui", true);
+    check("weavelight fly", false);
+}

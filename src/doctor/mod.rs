@@ -1,0 +1,131 @@
+//! What of the machine and the instrument is there and usable, without touching any of it.
+
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Examination {
+    /// Program and version.
+    pub program: &'static str,
+    /// Whether chessboard detection is built in.
+    pub opencv: bool,
+    /// Cores that this process may use.
+    pub cores: usize,
+    /// Memory that can be had without swapping; `None` where the system does not say.
+    pub available_memory_mb: Option<u64>,
+    /// The folder asked about.
+    pub folder: PathBuf,
+    /// Why it cannot be written; `None` where it can.
+    pub write_error: Option<String>,
+    /// Free space in it for this user; `None` where the system does not say.
+    pub free_space_mb: Option<u64>,
+    /// Serial ports that may belong to a light controller.
+    pub serial_ports: Vec<SerialPort>,
+}
+
+/// A serial port.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SerialPort {
+    /// As in `/dev/ttyACM0`.
+    pub path: PathBuf,
+    /// Whether this user may open it.
+    pub usable: bool,
+}
+
+/// Looks around. Ports are not opened: that would reset the controller.
+pub fn examine(folder: &Path) -> Examination {
+    Examination {
+        program: crate::files::PROGRAM,
+        opencv: cfg!(feature = "opencv"),
+        cores: std::thread::available_parallelism().map_or(1, usize::from),
+        available_memory_mb: fs::read_to_string("/proc/meminfo")
+            .ok()
+            .as_deref()
+            .and_then(available_memory_mb),
+        folder: folder.to_owned(),
+        write_error: tempfile::tempfile_in(folder).err().map(|error| error.to_string()),
+        free_space_mb: free_space_mb(folder),
+        serial_ports: serial_ports(Path::new("/dev")),
+    }
+}
+
+/// From the text of `/proc/meminfo`.
+fn available_memory_mb(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib / 1024)
+}
+
+#[cfg(unix)]
+fn free_space_mb(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_bavail.saturating_mul(disk.f_frsize) >> 20)
+}
+
+#[cfg(not(unix))]
+fn free_space_mb(_folder: &Path) -> Option<u64> {
+    None
+}
+
+/// USB serial ports, as Linux and macOS name them, in order.
+fn serial_ports(devices: &Path) -> Vec<SerialPort> {
+    let Ok(entries) = fs::read_dir(devices) else { return Vec::new() };
+    let is_port =
+        |name: &str| ["ttyACM", "ttyUSB", "cu.usb"].iter().any(|start| name.starts_with(start));
+    let mut ports: Vec<SerialPort> = entries
+        .filter_map(Result::ok)
+        .filter(|entry| is_port(&entry.file_name().to_string_lossy()))
+        .map(|entry| SerialPort { usable: may_open(&entry.path()), path: entry.path() })
+        .collect();
+    ports.sort_by(|a, b| a.path.cmp(&b.path));
+    ports
+}
+
+#[cfg(unix)]
+fn may_open(path: &Path) -> bool {
+    use rustix::fs::Access;
+    rustix::fs::access(path, Access::READ_OK | Access::WRITE_OK).is_ok()
+}
+
+#[cfg(not(unix))]
+fn may_open(_path: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_read_from_the_kernels_text() {
+        let check = |text: &str, expected: Option<u64>| {
+            assert_eq!(available_memory_mb(text), expected, "{text:?}")
+        };
+        check("MemTotal: 16000000 kB\nMemAvailable:    2048000 kB\n", Some(2000));
+        check("MemTotal: 16000000 kB\n", None);
+        check("MemAvailable: lots\n", None);
+    }
+
+    #[test]
+    fn ports_are_listed_in_order_and_nothing_else() {
+        let devices = tempfile::tempdir().unwrap();
+        for name in ["ttyUSB1", "ttyACM0", "tty0", "null"] {
+            fs::write(devices.path().join(name), "").unwrap();
+        }
+        let found = serial_ports(devices.path());
+        let names: Vec<_> =
+            found.iter().map(|port| port.path.file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, ["ttyACM0", "ttyUSB1"]);
+        assert!(found.iter().all(|port| port.usable));
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_told() {
+        let found = examine(Path::new("/no/such/folder"));
+        assert!(found.write_error.is_some());
+        assert_eq!(found.free_space_mb, None);
+        assert!(examine(&std::env::temp_dir()).write_error.is_none());
+    }
+}

@@ -1,0 +1,248 @@
+//! Picture sets from elsewhere as capture sessions: RTI `.lp` files, DiLiGenT folders, plain lists of directions. Axes: x
+//! right, y up, z to the viewer, which are the rig's own.
+
+mod lights;
+mod natural;
+mod pairs;
+mod pictures;
+#[cfg(test)]
+mod tests;
+
+use self::lights::{LightList, Named};
+use self::pairs::Pair;
+use self::pictures::Frame;
+use super::{Encoding, FrameEntry, Kind, Session, SessionError};
+use crate::files::{
+    FileError, Input, OutputKind, Provenance, StagedFolder, sha256_hex, sha256_of_file,
+};
+use crate::instrument::{CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights};
+use nalgebra::Matrix3;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use weavelight_calibration::description::{DirectionalLight, Light};
+
+/// The calibration's folder in an imported capture session.
+pub const CALIBRATION: &str = "calibration";
+
+/// A capture session as an output folder: pictures are precious, so one is never replaced.
+const OUTPUT: OutputKind = OutputKind { name: "capture session", marker: None, members: &[] };
+
+/// What to import.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// List of light directions: `.lp`, or one direction a line.
+    pub lights: PathBuf,
+    /// The pictures; may be empty where the list names them.
+    pub images: Vec<PathBuf>,
+    /// The capture session to write.
+    pub out: PathBuf,
+    /// How the pictures encode light; 8-bit pictures must say.
+    pub encoding: Option<Encoding>,
+    /// A picture that is not 0 where the object is.
+    pub mask: Option<PathBuf>,
+}
+
+/// What was imported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// The capture session.
+    pub session: PathBuf,
+    /// The calibration in it.
+    pub calibration: PathBuf,
+    /// Pictures, which is lights.
+    pub frames: usize,
+    /// Width and height.
+    pub size_px: [usize; 2],
+    /// Sentences for the user.
+    pub warnings: Vec<String>,
+}
+
+/// What goes wrong with an import. Each message says what, where, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The capture session that was to be written.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// An 8-bit picture whose encoding is not declared.
+    #[error("{}: has 8 bits and does not say how they encode light; add --encoding srgb (most cameras) or --encoding linear", .0.display())]
+    EncodingUnknown(PathBuf),
+    /// Directions and pictures do not pair.
+    #[error("{}: {lights} directions, but {what}; give one picture for each direction", .path.display())]
+    Count {
+        /// The list.
+        path: PathBuf,
+        /// Directions in it.
+        lights: usize,
+        /// What there is of the other.
+        what: String,
+    },
+    /// A picture that the list names is not there.
+    #[error("{}: names {name}, which is not {place}; correct the list or give that picture", .path.display())]
+    NamedMissing {
+        /// The list.
+        path: PathBuf,
+        /// The picture.
+        name: String,
+        /// Where it was looked for.
+        place: String,
+    },
+    /// Too few or too many lights.
+    #[error("{}: {count} directions; a solve takes {} to {}", .path.display(), LIGHT_COUNT.start(), LIGHT_COUNT.end())]
+    LightCount {
+        /// The list.
+        path: PathBuf,
+        /// Directions in it.
+        count: usize,
+    },
+    /// Pictures of different size.
+    #[error("{}: is {} x {}, but {} is {} x {}; all pictures must be of one size", .path.display(), .size[0], .size[1], .first.display(), .expected[0], .expected[1])]
+    Size {
+        /// The odd one.
+        path: PathBuf,
+        /// Its width and height.
+        size: [usize; 2],
+        /// The first one.
+        first: PathBuf,
+        /// Its width and height.
+        expected: [usize; 2],
+    },
+}
+
+/// Writes pictures and light directions as a capture session with its calibration. `progress` hears the finished share.
+///
+/// # Errors
+/// Where lists or pictures cannot be read or do not pair, or the target cannot be written; then nothing is.
+pub fn run(options: &Options, progress: &dyn Fn(f64, &str)) -> Result<Summary, ImportError> {
+    let list = LightList::read(&options.lights)?;
+    let count = list.directions.len();
+    if !LIGHT_COUNT.contains(&count) {
+        return Err(ImportError::LightCount { path: options.lights.clone(), count });
+    }
+    let (pairs, mut warnings) = pairs::pair(&list, options)?;
+    warnings.extend(list.warnings());
+    let staged = StagedFolder::create(&options.out, OUTPUT)?;
+    let name = name_of(&options.lights, staged.target());
+    let mut session = Session::new(staged.path(), Kind::Swatch, name);
+    let mut names = Names::default();
+    let mut first: Option<(PathBuf, [usize; 2])> = None;
+    for (k, pair) in pairs.iter().enumerate() {
+        progress(k as f64 / count as f64, "copying pictures");
+        let picture = pictures::read_frame(&pair.image, options.encoding)?;
+        let (path, expected) = first.get_or_insert_with(|| (pair.image.clone(), picture.size_px));
+        check_size(&pair.image, picture.size_px, path, *expected)?;
+        session.frames.push(add_frame(&staged, &mut names, pair, &picture, options.encoding)?);
+    }
+    let size_px = first.map_or([0, 0], |(_, size)| size);
+    if let Some(mask) = &options.mask {
+        let picture = pictures::read_mask(mask)?;
+        check_size(mask, picture.size_px, &pairs[0].image, size_px)?;
+        let name = names.free("mask.png");
+        picture.write(&staged.join(&name))?;
+        session.mask = Some(name.into());
+    }
+    session.save()?;
+    write_calibration(&staged.join(CALIBRATION), &list, &pairs, options)?;
+    let target = staged.target().to_owned();
+    staged.commit()?;
+    progress(1.0, "done");
+    Ok(Summary {
+        calibration: target.join(CALIBRATION),
+        session: target,
+        frames: count,
+        size_px,
+        warnings,
+    })
+}
+
+fn check_size(
+    path: &Path,
+    size: [usize; 2],
+    first: &Path,
+    expected: [usize; 2],
+) -> Result<(), ImportError> {
+    if size == expected {
+        return Ok(());
+    }
+    Err(ImportError::Size { path: path.to_owned(), size, first: first.to_owned(), expected })
+}
+
+/// A picture set is known by its folder; where that has no name, by the capture session's.
+fn name_of(lights: &Path, target: &Path) -> String {
+    let folder = lights.parent().and_then(Path::file_name).or(target.file_name());
+    folder.map_or_else(|| "imported".to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+fn add_frame(
+    staged: &StagedFolder,
+    names: &mut Names,
+    pair: &Pair,
+    picture: &Frame,
+    encoding: Option<Encoding>,
+) -> Result<FrameEntry, ImportError> {
+    let file_name = pair.image.file_name().unwrap_or_default().to_string_lossy();
+    let name = names.free(&file_name);
+    let path = staged.join(&name);
+    std::fs::write(&path, &picture.bytes).map_err(|source| FileError::write(&path, source))?;
+    let mut frame = FrameEntry::new(name, Some(pair.light), 1.0, 100.0);
+    frame.sha256 = Some(sha256_hex(&picture.bytes));
+    frame.encoding = encoding;
+    Ok(frame)
+}
+
+/// Names already given in the folder: pictures from several folders may share one.
+#[derive(Default)]
+struct Names(HashSet<String>);
+
+impl Names {
+    fn free(&mut self, wanted: &str) -> String {
+        let numbered = |k: usize| if k == 0 { wanted.to_owned() } else { format!("{k}-{wanted}") };
+        let taken =
+            |name: &String| self.0.contains(name) || name == super::MANIFEST || name == CALIBRATION;
+        let name = (0..).map(numbered).find(|name| !taken(name)).unwrap_or_default();
+        self.0.insert(name.clone());
+        name
+    }
+}
+
+/// Far lights of which a picture's number divided by the intensity is the albedo times the cosine.
+fn write_calibration(
+    folder: &Path,
+    list: &LightList,
+    pairs: &[Pair],
+    options: &Options,
+) -> Result<(), ImportError> {
+    let light = |k: usize| {
+        let far =
+            DirectionalLight { direction: list.directions[k], intensity: list.intensities[k] };
+        CalibratedLight::new(Light::Directional(far))
+    };
+    let lights: Vec<CalibratedLight> = (0..pairs.len()).map(light).collect();
+    let mut inputs = Vec::new();
+    for path in &list.files {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        inputs.push(Input { name, sha256: sha256_of_file(path)? });
+    }
+    let provenance = Provenance::of_this_program(None, inputs, toml::Table::new());
+    write_lights(folder, &lights, &provenance)?;
+    // sRGB pictures come in sRGB's primaries; of others nothing is known.
+    let known = options.encoding == Some(Encoding::Srgb);
+    let color = Color { camera_to_linear_srgb: known.then(Matrix3::identity), ..Color::default() };
+    write_color(folder, &color, &provenance)?;
+    Ok(())
+}
+
+impl LightList {
+    fn warnings(&self) -> Option<String> {
+        let behind = self.directions.iter().filter(|direction| direction.z <= 0.0).count();
+        let path = self.files[0].display();
+        (behind > 0).then(|| format!("{path}: {behind} lights come from behind the picture (z <= 0); z points to the viewer"))
+    }
+
+    /// The names that the list gives to the pictures, if it does.
+    fn names(&self) -> Option<&Named> {
+        self.named.as_ref()
+    }
+}
