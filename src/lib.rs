@@ -10,10 +10,12 @@
 //!   [`solution`]: the folder that a solve writes
 //! - [`photometry`]: the kernels, on one band of rows; [`solve`]: the run around them
 //! - [`simulate`]: the simulated rig's folders
+//! - [`device`]: the light board, and what else the capture needs of the world
 //! - [`report`]: what a command tells
 
 pub mod cli;
 pub mod compare;
+pub mod device;
 pub mod doctor;
 pub mod files;
 pub mod instrument;

@@ -13,6 +13,7 @@
 /* Ten bits at 115200 baud. */
 #define BYTE_CYCLES (CLOCK_HZ * 10 / 115200)
 #define US_CYCLES (CLOCK_HZ / 1000000)
+#define EICRA 0x69
 #define QUEUE_SIZE 65536
 #define EDGES_MAX 4000000
 
@@ -223,6 +224,8 @@ void board_set_boot_delay(double ms) {
 /* A reset is a reset, whoever asked for it: the watchdog in the processor, or board_reset. */
 static void after_reset(void) {
     was_reset = false;
+    /* D2 and D3, outputs here, as edge-triggered: else libsimavr looks at their level in every cycle, asleep or not. */
+    avr->data[EICRA] = 0x0F;
     if (hung_at >= 0) memcpy(avr->flash + hung_at, hung_flash, 2);
     hung_at = -1;
     held_until = cycles + boot_delay;

@@ -1,0 +1,3 @@
+//! What a capture needs of the world outside: the light board.
+
+pub mod board;
