@@ -1,6 +1,7 @@
 # make demo    simulate a rig, scan a swatch, solve it, and open the report's folder: the whole job, no hardware
 # make test    every test
 # make build   the release executables with every feature, in target/release
+# make firmware the light board's firmware, and the simulated board that tests run it in
 # make bench   run time against error and against touching the bytes once
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
@@ -8,8 +9,10 @@ SHELL := /bin/bash
 LINKER_PACKAGES := gcc libc6-dev
 # Chessboards are found by OpenCV; its bindings are generated with clang.
 OPENCV_PACKAGES := g++ pkg-config clang libclang-dev libopencv-dev
+# The light board's firmware, and the simulated processor that its tests run it in.
+FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
-.PHONY: demo test build bench packages-demo packages-all
+.PHONY: demo test build bench soak firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -17,11 +20,17 @@ packages-demo:
 packages-all:
 	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES)
 
+packages-firmware:
+	@bash .ci/packages $(LINKER_PACKAGES) $(FIRMWARE_PACKAGES)
+
+firmware: packages-firmware
+	@$(MAKE) --no-print-directory -C firmware
+
 demo: packages-demo
 	cargo run --release --locked --quiet -- demo --out demo
 
 # nextest where it is there: it runs the tests of several executables side by side.
-test: packages-all
+test: packages-all firmware
 	@if cargo nextest --version >/dev/null 2>&1; then \
 	    cargo nextest run --locked --workspace --all-features; \
 	else \

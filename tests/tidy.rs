@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use weavelight::device::board::wire::REFUSALS;
 
 /// A longer file must say why in a line that starts with `//! Long because`.
 const LONGEST_FILE: usize = 600;
@@ -148,4 +149,28 @@ fn no_file_is_longer_than_agreed_without_a_reason() {
         }
     }
     expect_none("files over 600 lines", &long);
+}
+
+#[test]
+fn error_numbers_agree_in_protocol_firmware_and_host() {
+    let protocol = include_str!("../firmware/PROTOCOL.md");
+    let firmware = include_str!("../firmware/weavelight/protocol.h");
+    let section = protocol.split("## Errors").nth(1).unwrap().split("##").next().unwrap();
+    for (refusal, name) in REFUSALS {
+        let number = refusal as u8;
+        assert!(
+            section.contains(&format!("| {number} | {name} |")),
+            "PROTOCOL.md: {number} {name}"
+        );
+        assert!(
+            firmware.contains(&format!("ERROR_{name} = {number},")),
+            "protocol.h: {number} {name}"
+        );
+    }
+    assert_eq!(
+        section.lines().filter(|line| line.starts_with("| ")).count(),
+        REFUSALS.len() + 2,
+        "PROTOCOL.md"
+    );
+    assert_eq!(firmware.matches("    ERROR_").count(), REFUSALS.len() + 1, "protocol.h");
 }

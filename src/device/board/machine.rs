@@ -260,7 +260,9 @@ impl LightBoard {
     fn take_line(&mut self, line: &[u8], now: Duration) {
         match Line::parse(line) {
             None => {
-                self.heard = Some(String::from_utf8_lossy(line).chars().filter(|c| !c.is_control()).collect());
+                self.heard = Some(
+                    String::from_utf8_lossy(line).chars().filter(|c| !c.is_control()).collect(),
+                );
                 self.note_damage(now);
             }
             Some(Line::Booted { cause }) => self.note_restart(cause, now),
@@ -274,10 +276,10 @@ impl LightBoard {
     }
 
     fn note_damage(&mut self, now: Duration) {
-        if let Some(waiting) = &mut self.waiting {
-            if waiting.why == Failure::NoAnswer {
-                waiting.why = Failure::Noise;
-            }
+        if let Some(waiting) = &mut self.waiting
+            && waiting.why == Failure::NoAnswer
+        {
+            waiting.why = Failure::Noise;
         }
         self.hurry(now);
     }
@@ -299,7 +301,9 @@ impl LightBoard {
         match (&answer, waiting.request) {
             (Answer::Refused(refusal), _) => self.take_refusal(*refusal, waiting, now),
             (Answer::Identity(_), Request::Identify)
-            | (Answer::Value(_), Request::Get(_) | Request::Set(..)) => self.finish(&waiting, answer),
+            | (Answer::Value(_), Request::Get(_) | Request::Set(..)) => {
+                self.finish(&waiting, answer);
+            }
             (Answer::Outputs(outputs), request) if is_about_outputs(request) => {
                 self.take_outputs(*outputs, waiting, now);
             }
@@ -356,8 +360,10 @@ impl LightBoard {
 
     /// A restart whose message was lost shows in the board's clock.
     fn watch_clock(&mut self, outputs: Outputs) {
-        let wrapped = |before: u32| before > u32::MAX - CLOCK_WRAP_MS && outputs.board_ms < CLOCK_WRAP_MS;
-        let restarted = self.board_ms.is_some_and(|before| outputs.board_ms < before && !wrapped(before));
+        let wrapped =
+            |before: u32| before > u32::MAX - CLOCK_WRAP_MS && outputs.board_ms < CLOCK_WRAP_MS;
+        let restarted =
+            self.board_ms.is_some_and(|before| outputs.board_ms < before && !wrapped(before));
         self.board_ms = Some(outputs.board_ms);
         if restarted {
             self.lights = Some(0);

@@ -7,5 +7,6 @@ mod machine;
 pub mod wire;
 
 pub use machine::{
-    BUDGET, Busy, Event, Failure, IDENTIFY_BUDGET, IDENTIFY_RETRY, Interruption, KEEP_ALIVE, LightBoard, RETRY, RETRY_AT_ONCE,
+    BUDGET, Busy, Event, Failure, IDENTIFY_BUDGET, IDENTIFY_RETRY, Interruption, KEEP_ALIVE,
+    LightBoard, RETRY, RETRY_AT_ONCE,
 };

@@ -211,7 +211,9 @@ impl Line {
             ["!", "BOOT", cause] => Some(Self::Booted { cause: cause.to_owned() }),
             ["!", "SAFE", reason] => Some(Self::WentDark { reason: reason.to_owned() }),
             ["?", ref rest @ ..] => Some(Self::Answer(None, parse_answer(rest)?)),
-            [seq, ref rest @ ..] => Some(Self::Answer(Some(seq.parse().ok()?), parse_answer(rest)?)),
+            [seq, ref rest @ ..] => {
+                Some(Self::Answer(Some(seq.parse().ok()?), parse_answer(rest)?))
+            }
             [] => None,
         }
     }
@@ -221,7 +223,9 @@ fn parse_answer(words: &[&str]) -> Option<Answer> {
     match *words {
         ["ERR", number, name] => {
             let number: u8 = number.parse().ok()?;
-            let known = REFUSALS.iter().find(|(refusal, known)| *refusal as u8 == number && *known == name)?;
+            let known = REFUSALS
+                .iter()
+                .find(|(refusal, known)| *refusal as u8 == number && *known == name)?;
             Some(Answer::Refused(known.0))
         }
         ["OK", value] => Some(Answer::Value(value.parse().ok()?)),

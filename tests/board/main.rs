@@ -1,0 +1,11 @@
+//! The light board: its protocol at both ends, and the real firmware in a simulated processor.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
+#![allow(clippy::print_stdout, reason = "tests say what was not run, and what was measured")]
+#![allow(dead_code, reason = "the tests of the link come next")]
+
+mod exchange;
+mod firmware;
+mod machine;
+mod protocol;
+mod simboard;
