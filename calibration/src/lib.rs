@@ -4,8 +4,10 @@
 //! [`description`] holds plain data and conventions only; it is all that the simulator may use (a house rule checks
 //! it). Everything that *computes* with a description ([`projection`], [`irradiance`], [`gain`]) lives beside it.
 
+pub mod color;
 pub mod description;
 pub mod gain;
 pub mod irradiance;
 pub mod lights;
 pub mod projection;
+pub mod response;
