@@ -4,6 +4,9 @@
 //! [`description`] holds plain data and conventions only; it is all that the simulator may use (a house rule checks
 //! it). Everything that *computes* with a description ([`projection`], [`irradiance`], [`gain`]) lives beside it.
 
+pub mod board;
+#[cfg(feature = "opencv")]
+pub mod chessboard;
 pub mod color;
 pub mod description;
 pub mod gain;
