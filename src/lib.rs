@@ -24,5 +24,6 @@ pub mod raster;
 pub mod raw;
 pub mod report;
 pub mod session;
+pub mod simulate;
 pub mod solution;
 pub mod solve;

@@ -8,7 +8,6 @@ mod gui;
 mod import;
 mod output;
 mod progress;
-mod solve;
 #[cfg(test)]
 mod tests;
 
@@ -29,7 +28,6 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    Solve(solve::Args),
     Import(import::Args),
     Compare(compare::Args),
     Doctor(doctor::Args),
@@ -39,7 +37,6 @@ enum Command {
 impl Command {
     fn run(&self) -> Result<Output, Failure> {
         match self {
-            Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Doctor(args) => doctor::run(args),

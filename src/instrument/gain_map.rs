@@ -54,6 +54,8 @@ pub(super) fn encode_gain_map(
     let mut bytes = Cursor::new(Vec::new());
     exr::prelude::Image::from_channels((map.width, map.height), channels)
         .write()
+        // Several threads would write blocks in the order in which they finish: other bytes every time.
+        .non_parallel()
         .to_buffered(&mut bytes)
         .map_err(|error| unwritable(format!("the gain map of light {light}: {error}")))?;
     Ok(bytes.into_inner())
