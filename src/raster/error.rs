@@ -68,20 +68,12 @@ impl PictureError {
     }
 }
 
-/// A picture file that could not be read or written.
+/// A picture file that could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// Missing, or not readable.
     #[error("{}: {source}; check the name and the permissions", path.display())]
     Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// No space, or not allowed.
-    #[error("{}: {source}; check the free space and the permissions of the folder", path.display())]
-    Write {
         /// The file.
         path: PathBuf,
         /// What the system says.

@@ -1,8 +1,10 @@
 //! Any picture file that other programs write, values as the file has them.
 
 use super::guard::guarded;
-use super::{PictureError, exr_in, limits};
+use super::{FileError, PictureError, exr_in, limits};
 use std::io::Cursor;
+use std::path::Path;
+use weavelight_calibration::description::Image;
 
 /// A decoded picture: rows from the top left, channels interleaved, alpha left out.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +71,38 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Picture, PictureError> {
         Some(Format::Exr) => exr_in::decode_exr(bytes)?.into_picture(),
         None => Err(not_a_picture(bytes, PICTURES)),
     }
+}
+
+/// Reads a picture file; see [`decode_picture`].
+///
+/// # Errors
+/// [`FileError`] with the path.
+pub fn read_picture(path: &Path) -> Result<Picture, FileError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    decode_picture(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
+}
+
+/// Reads a mask: whatever is not zero (nor NaN) in any channel is inside.
+///
+/// # Errors
+/// [`FileError`] with the path. Whether the size fits is the caller's to judge.
+pub fn read_mask(path: &Path) -> Result<Image<bool>, FileError> {
+    let picture = read_picture(path)?;
+    fn inside<T: Copy>(values: &[T], channels: usize, counts: impl Fn(T) -> bool) -> Vec<bool> {
+        values
+            .chunks_exact(channels)
+            .map(|pixel| pixel.iter().any(|&value| counts(value)))
+            .collect()
+    }
+    let data = match &picture.values {
+        Values::U8(values) => inside(values, picture.channels, |value| value != 0),
+        Values::U16(values) => inside(values, picture.channels, |value| value != 0),
+        Values::F32(values) => {
+            inside(values, picture.channels, |value| value != 0.0 && !value.is_nan())
+        }
+    };
+    Ok(Image { width: picture.width, height: picture.height, data })
 }
 
 /// The error for bytes of no known picture format.

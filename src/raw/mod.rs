@@ -16,6 +16,8 @@ mod picture;
 mod read;
 mod sensor;
 mod tags;
+#[cfg(test)]
+mod tests;
 mod unpack;
 
 pub use demosaic::demosaic;

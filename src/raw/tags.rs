@@ -136,25 +136,42 @@ fn size_of_kind(kind: u16) -> Option<usize> {
 pub(crate) struct Directory<'a> {
     pub(crate) block: Block<'a>,
     entries: Vec<Entry>,
+    /// Tags whose values lie beyond the block's end.
+    cut: Vec<u16>,
 }
 
 impl<'a> Directory<'a> {
-    /// The directory at `offset`, and where the next one is (0: none). Entries of unknown type or beyond the block's end
-    /// are left out.
+    /// The directory at `offset`, and where the next one is (0: none). Entries of unknown type are left out.
     pub(crate) fn parse(block: Block<'a>, offset: usize) -> Option<(Self, usize)> {
         let count = usize::from(block.u16(offset)?);
-        let parse_entry = |i: usize| {
+        block.slice(offset, 2 + 12 * count)?;
+        let mut directory = Self { block, entries: Vec::new(), cut: Vec::new() };
+        for i in 0..count {
             let at = offset + 2 + 12 * i;
-            let (tag, kind) = (block.u16(at)?, block.u16(at + 2)?);
-            let count = block.u32(at + 4)? as usize;
-            let length = size_of_kind(kind)?.checked_mul(count)?;
+            let (tag, kind, count) =
+                (block.u16(at)?, block.u16(at + 2)?, block.u32(at + 4)? as usize);
+            let Some(length) = size_of_kind(kind).map(|size| size.saturating_mul(count)) else {
+                continue;
+            };
             let offset = if length <= 4 { at + 8 } else { block.u32(at + 8)? as usize };
-            block.slice(offset, length)?;
-            Some(Entry { tag, kind, count, offset })
-        };
-        let entries = (0..count).filter_map(parse_entry).collect();
+            match block.slice(offset, length) {
+                Some(_) => directory.entries.push(Entry { tag, kind, count, offset }),
+                None => directory.cut.push(tag),
+            }
+        }
         let next = block.u32(offset + 2 + 12 * count).unwrap_or(0) as usize;
-        Some((Self { block, entries }, next))
+        Some((directory, next))
+    }
+
+    /// # Errors
+    /// Some values lie beyond the end of the file.
+    pub(crate) fn check_whole(&self) -> Result<(), DecodeError> {
+        match self.cut.first() {
+            Some(tag) => Err(DecodeError::damaged(format!(
+                "the values of its tag {tag:#06x} lie beyond its end"
+            ))),
+            None => Ok(()),
+        }
     }
 
     fn entry(&self, tag: u16) -> Option<&Entry> {

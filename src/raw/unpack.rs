@@ -31,6 +31,7 @@ impl Storage {
     /// # Errors
     /// Absent or contradictory tags, absurd dimensions, data beyond the file's end.
     pub(crate) fn parse(tiff: &Tiff, directory: &Directory) -> Result<Self, DecodeError> {
+        directory.check_whole()?;
         let require = |tag, name: &str| {
             directory
                 .integer(tag)

@@ -1,0 +1,6 @@
+mod builder;
+mod dng;
+mod mutations;
+mod nef;
+mod pictures;
+mod reading;
