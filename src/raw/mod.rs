@@ -13,6 +13,7 @@ mod metadata;
 mod nef;
 mod nikon_bits;
 mod picture;
+mod preview;
 mod read;
 mod sensor;
 mod tags;
@@ -24,6 +25,7 @@ pub use demosaic::demosaic;
 pub use error::{DecodeError, ReadError};
 pub use frame::{Frame, Layout, Metadata, Samples};
 pub use hint::{Encoding, Hint};
+pub use preview::preview;
 pub use read::{Source, read, read_all, read_source};
 
 use crate::raster::{Format, PictureError, not_a_picture};

@@ -10,15 +10,15 @@ use weavelight_calibration::description::{Camera, Image};
 use weavelight_calibration::projection::Projector;
 
 /// The maps of a solution; zero where unsolved.
-pub(crate) struct Finished {
+pub struct Finished {
     /// Unit normals, rig frame.
-    pub(crate) normal: Image<[f32; 3]>,
+    pub normal: Image<[f32; 3]>,
     /// Linear RGB.
-    pub(crate) albedo: Image<[f32; 3]>,
+    pub albedo: Image<[f32; 3]>,
     /// Expected error of the normal, degrees.
-    pub(crate) confidence: Image<f32>,
+    pub confidence: Image<f32>,
     /// 255 where solved.
-    pub(crate) mask: Image<u8>,
+    pub mask: Image<u8>,
 }
 
 /// What R, G, B mean.

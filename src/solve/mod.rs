@@ -27,9 +27,10 @@ mod signal;
 mod tests;
 
 pub use error::SolveError;
+pub use finish::Finished;
 pub use in_memory::solve_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 pub use options::{Grid, NormalY, Options};
 pub use progress::{Progress, Stage};
-pub use run::{method_name, run};
+pub use run::{Page, Shown, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};

@@ -9,6 +9,8 @@ pub enum Stage {
     Colour,
     /// Encoding and writing files; counted in files.
     Write,
+    /// Making the page; not counted.
+    Page,
 }
 
 impl Stage {
@@ -19,6 +21,7 @@ impl Stage {
             Stage::Solve => "solve",
             Stage::Colour => "colour",
             Stage::Write => "write",
+            Stage::Page => "page",
         }
     }
 }

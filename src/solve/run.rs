@@ -8,16 +8,18 @@ use super::load::{Loaded, load};
 use super::maps::Counts;
 use super::options::{Grid, Options};
 use super::progress::{Progress, Stage};
-use super::scene::Scene;
-use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file};
+use super::scene::{Exposure, Scene};
+use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE, write_camera};
 use crate::photometry::{Method, Outcome};
+use crate::raw::preview;
 use crate::session::Session;
-use crate::solution::{OUTPUT, PlaneReport, REPORT_JSON, Report};
+use crate::solution::{OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, Report};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
-use weavelight_calibration::description::{Camera, Plane};
+use weavelight_calibration::description::{Camera, Image, Plane};
 use weavelight_calibration::projection::Projector;
 
 /// Solves a capture session and writes the solution's folder; nothing stands under its name before it is whole.
@@ -27,17 +29,45 @@ use weavelight_calibration::projection::Projector;
 /// # Errors
 /// [`SolveError`] names the file and the remedy; nothing is left behind then.
 pub fn run(options: &Options, progress: &(dyn Fn(Progress) + Sync)) -> Result<Report, SolveError> {
+    run_with_page(options, progress, None)
+}
+
+/// Writes the page that a person looks at.
+pub type Page<'a> = &'a (dyn Fn(&Shown) -> String + Sync);
+
+/// What a page can show, before the solution stands under its name.
+pub struct Shown<'a> {
+    /// The capture session's name.
+    pub name: &'a str,
+    /// The maps.
+    pub maps: &'a Finished,
+    /// The frames made small, in light order, ambient frames last; linear, each with its caption.
+    pub frames: &'a [(String, Image<[f32; 3]>)],
+    /// What the solve says of itself; the page's own time is not in it yet.
+    pub report: &'a Report,
+}
+
+/// As [`run`], with a page beside the maps.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with_page(
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+    page: Option<Page>,
+) -> Result<Report, SolveError> {
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
         .map_err(|source| SolveError::Threads { threads, source })?;
-    pool.install(|| run_on_this_pool(options, progress))
+    pool.install(|| run_on_this_pool(options, progress, page))
 }
 
 fn run_on_this_pool(
     options: &Options,
     progress: &(dyn Fn(Progress) + Sync),
+    page: Option<Page>,
 ) -> Result<Report, SolveError> {
     let mut watch = Stopwatch::start();
     let session = Session::load(&options.session)?;
@@ -53,6 +83,7 @@ fn run_on_this_pool(
     let (maps, of_solve) = solve_scene(&scene, options.method, progress)?;
     warnings.extend(of_solve);
     watch.lap(Stage::Solve);
+    let frames = if page.is_some() { previews(&scene) } else { Vec::new() };
     let rest = Rest::of(scene);
     let counts = maps.counts;
     let finished = on_grid(finish(maps, &rest.color), rest.camera.as_ref(), options.grid);
@@ -60,10 +91,36 @@ fn run_on_this_pool(
     write_maps(staged.path(), &finished, options.normal_y, progress)?;
     copy_camera(&rest, options, staged.path())?;
     watch.lap(Stage::Write);
-    let report = report(options, &rest, &finished, counts, watch, warnings, inputs);
+    let mut report = report(options, &rest, &finished, counts, &watch, warnings, inputs);
+    if let Some(page) = page {
+        let shown =
+            Shown { name: &session.name, maps: &finished, frames: &frames, report: &report };
+        write_atomic(&staged.join(REPORT_HTML), page(&shown).as_bytes())?;
+        watch.lap(Stage::Page);
+        report.seconds = watch.seconds;
+    }
     report.write(&staged.join(REPORT_JSON))?;
     staged.commit()?;
     Ok(report)
+}
+
+/// Longest side of the frames on a page, pixels.
+const PREVIEW_SIDE: usize = 320;
+
+fn previews(scene: &Scene) -> Vec<(String, Image<[f32; 3]>)> {
+    let lit = scene.lights.iter().flat_map(|light| {
+        light.exposures.iter().map(|exposure| (format!("light {}", light.index), exposure))
+    });
+    let dark = scene.ambient.iter().map(|exposure| ("ambient".to_owned(), exposure));
+    let all: Vec<(String, &Exposure)> = lit.chain(dark).collect();
+    all.into_par_iter()
+        .map(|(name, exposure)| {
+            let file = exposure.path.file_name().unwrap_or_default().to_string_lossy();
+            let caption =
+                format!("{name}: {file}, {} s, ISO {}", exposure.exposure_s, exposure.iso);
+            (caption, preview(&exposure.frame, PREVIEW_SIDE))
+        })
+        .collect()
 }
 
 /// What is still needed of a scene when its frames are not: they make room for the files being encoded.
@@ -115,7 +172,7 @@ fn report(
     rest: &Rest,
     maps: &Finished,
     counts: Counts,
-    watch: Stopwatch,
+    watch: &Stopwatch,
     warnings: Vec<String>,
     inputs: Vec<Input>,
 ) -> Report {
@@ -136,7 +193,7 @@ fn report(
         saturated_pixels: counts.saturated as u64,
         outcomes: outcomes(&counts),
         residual_rms: (counts.solved() > 0).then(|| counts.residual_rms()),
-        seconds: watch.seconds,
+        seconds: watch.seconds.clone(),
         mm_per_px: camera.and_then(|camera| mm_per_px(&camera, &rest.plane)),
         undistorted,
         plane: PlaneReport {
