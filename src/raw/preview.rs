@@ -18,7 +18,7 @@ pub fn preview(frame: &Frame, longest_side: usize) -> Image<[f32; 3]> {
             let columns = (x * factor..((x + 1) * factor).min(cells.0)).step_by(step);
             let mut mean = Mean::default();
             rows.for_each(|row| {
-                columns.clone().for_each(|column| mean.add_cell(frame, column, row))
+                columns.clone().for_each(|column| mean.add_cell(frame, column, row));
             });
             data.push(mean.color());
         }
@@ -53,7 +53,7 @@ impl Mean {
                 self.add(cfa.channel(x, y) as usize, (sample(frame, pixel) - black) / range);
             }
             Layout::Grey => {
-                (0..3).for_each(|c| self.add(c, (sample(frame, pixel) - black) / range))
+                (0..3).for_each(|c| self.add(c, (sample(frame, pixel) - black) / range));
             }
             Layout::Rgb => {
                 (0..3).for_each(|c| self.add(c, (sample(frame, 3 * pixel + c) - black) / range));
