@@ -21,9 +21,9 @@ pub(crate) fn check_frames(scene: &Scene) -> Result<(), SolveError> {
     if let Some(other) = exposures.find(|e| shape(&e.frame) != shape(&first.frame)) {
         return Err(SolveError::DifferentFrames {
             a: first.path.clone(),
-            a_is: describe(&first.frame),
+            a_is: describe(first.frame.width, first.frame.height, first.frame.layout),
             b: other.path.clone(),
-            b_is: describe(&other.frame),
+            b_is: describe(other.frame.width, other.frame.height, other.frame.layout),
         });
     }
     for exposure in scene.exposures() {
@@ -37,13 +37,14 @@ fn shape(frame: &Frame) -> (usize, usize, Layout) {
     (frame.width, frame.height, frame.layout)
 }
 
-fn describe(frame: &Frame) -> String {
-    let layout = match frame.layout {
-        Layout::Mosaic(cfa) => format!("a {} mosaic", cfa.name()),
+/// "4928 x 3264 RGGB mosaic", for messages.
+pub(crate) fn describe(width: usize, height: usize, layout: Layout) -> String {
+    let layout = match layout {
+        Layout::Mosaic(cfa) => format!("{} mosaic", cfa.name()),
         Layout::Grey => "grey".to_owned(),
         Layout::Rgb => "RGB".to_owned(),
     };
-    format!("{} x {} {layout}", frame.width, frame.height)
+    format!("{width} x {height} {layout}")
 }
 
 fn too_few(scene: &Scene) -> Result<(), SolveError> {

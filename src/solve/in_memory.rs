@@ -3,11 +3,12 @@
 use super::SolveError;
 use super::bands::Run;
 use super::check::{check_frames, check_light_field};
-use super::field::LightField;
+use super::field::{LightField, Unseen};
 use super::maps::Maps;
 use super::noise::{LinearNoise, full_scale};
 use super::progress::{Progress, Stage};
 use super::scene::Scene;
+use super::witness::question;
 use crate::instrument::{CAMERA_FILE, Noise};
 use crate::photometry::Method;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -40,16 +41,35 @@ pub fn solve_scene(
     Ok((maps, warnings))
 }
 
+/// Leaves out lights that add nothing; warnings about these and about lights that contradict the others.
+///
+/// # Errors
+/// As [`solve_scene`].
+pub fn leave_out_dark_lights(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
+    check_frames(scene)?;
+    let verdict = question(scene, &light_field(scene)?);
+    let mut position = 0;
+    scene.lights.retain(|_| {
+        position += 1;
+        !verdict.dark.contains(&(position - 1))
+    });
+    Ok(verdict.warnings)
+}
+
 /// The light field of a scene's lights.
 pub(crate) fn light_field(scene: &Scene) -> Result<LightField<'_>, SolveError> {
     let lights = scene.lights.iter().map(|light| &light.calibrated.light).collect();
-    LightField::new(lights, scene.camera.as_ref(), &scene.plane, scene.size_px()).map_err(
-        |unseen| SolveError::Unseen {
-            calibration: scene.origin.calibration.join(CAMERA_FILE),
-            u: unseen.pixel[0],
-            v: unseen.pixel[1],
-        },
-    )
+    LightField::new(lights, scene.camera.as_ref(), &scene.plane, scene.size_px())
+        .map_err(|unseen| unseen_pixel(scene, unseen))
+}
+
+/// A pixel that shows no point of the plane, as an error.
+pub(crate) fn unseen_pixel(scene: &Scene, unseen: Unseen) -> SolveError {
+    SolveError::Unseen {
+        calibration: scene.origin.calibration.join(CAMERA_FILE),
+        u: unseen.pixel[0],
+        v: unseen.pixel[1],
+    }
 }
 
 /// The sensor's noise.

@@ -5,6 +5,7 @@
 
 mod bands;
 mod check;
+mod current;
 mod drift;
 mod encode;
 mod error;
@@ -16,6 +17,7 @@ mod load;
 mod maps;
 mod noise;
 mod options;
+pub mod preview;
 mod progress;
 #[cfg(test)]
 mod reference;
@@ -25,12 +27,13 @@ mod sensor;
 mod signal;
 #[cfg(test)]
 mod tests;
+mod witness;
 
 pub use error::SolveError;
 pub use finish::Finished;
-pub use in_memory::solve_scene;
+pub use in_memory::{leave_out_dark_lights, solve_scene};
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
-pub use options::{Grid, NormalY, Options};
+pub use options::{Grid, NormalY, Options, Reuse};
 pub use progress::{Progress, Stage};
-pub use run::{Page, Shown, method_name, run, run_with_page};
+pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};

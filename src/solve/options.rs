@@ -20,6 +20,18 @@ pub struct Options {
     pub mask: Option<PathBuf>,
     /// Threads; `None`: one per core. The result does not depend on it.
     pub threads: Option<usize>,
+    /// Whether a solution that is up to date is made again.
+    pub reuse: Reuse,
+}
+
+/// What to do where the same solution stands already.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reuse {
+    /// Leave it, if inputs and settings are the same.
+    #[default]
+    IfCurrent,
+    /// Make it again.
+    Never,
 }
 
 /// The pixel grid of the maps.
@@ -58,6 +70,7 @@ impl Options {
             normal_y: NormalY::Up,
             mask: None,
             threads: None,
+            reuse: Reuse::IfCurrent,
         }
     }
 }

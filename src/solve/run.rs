@@ -1,12 +1,13 @@
 //! The whole run, from folders to a folder.
 
 use super::SolveError;
+use super::current::{key, still_current};
 use super::encode::write_maps;
 use super::finish::{Finished, color_space, finish, pinhole, undistort};
-use super::in_memory::solve_scene;
+use super::in_memory::{leave_out_dark_lights, solve_scene};
 use super::load::{Loaded, load};
 use super::maps::Counts;
-use super::options::{Grid, Options};
+use super::options::{Grid, Options, Reuse};
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Scene};
 use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
@@ -22,13 +23,22 @@ use std::time::Instant;
 use weavelight_calibration::description::{Camera, Image, Plane};
 use weavelight_calibration::projection::Projector;
 
+/// A solution that stands on disk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solved {
+    /// Its `report.json`.
+    pub report: Report,
+    /// Whether it was there already, made from the same inputs with the same settings.
+    pub up_to_date: bool,
+}
+
 /// Solves a capture session and writes the solution's folder; nothing stands under its name before it is whole.
 ///
 /// The same inputs give the same maps, byte for byte, whatever the number of threads and the order of the frames.
 ///
 /// # Errors
 /// [`SolveError`] names the file and the remedy; nothing is left behind then.
-pub fn run(options: &Options, progress: &(dyn Fn(Progress) + Sync)) -> Result<Report, SolveError> {
+pub fn run(options: &Options, progress: &(dyn Fn(Progress) + Sync)) -> Result<Solved, SolveError> {
     run_with_page(options, progress, None)
 }
 
@@ -55,7 +65,7 @@ pub fn run_with_page(
     options: &Options,
     progress: &(dyn Fn(Progress) + Sync),
     page: Option<Page>,
-) -> Result<Report, SolveError> {
+) -> Result<Solved, SolveError> {
     let threads = options.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -68,18 +78,47 @@ fn run_on_this_pool(
     options: &Options,
     progress: &(dyn Fn(Progress) + Sync),
     page: Option<Page>,
-) -> Result<Report, SolveError> {
-    let mut watch = Stopwatch::start();
+) -> Result<Solved, SolveError> {
+    let watch = Stopwatch::start();
     let session = Session::load(&options.session)?;
     let calibration = Calibration::load(&options.calibration)?;
     if options.grid == Grid::Undistorted && calibration.camera.is_none() {
         return Err(SolveError::NothingToUndistort { calibration: calibration.folder });
     }
-    let inputs = inputs(&session, &calibration)?;
+    let made_from = MadeFrom {
+        key: key(options, &session, &calibration)?,
+        inputs: inputs(&session, &calibration)?,
+    };
+    let before = match options.reuse {
+        Reuse::IfCurrent => still_current(&options.out, &made_from.key, &session, page.is_some()),
+        Reuse::Never => None,
+    };
+    if let Some(report) = before {
+        return Ok(Solved { report, up_to_date: true });
+    }
+    let report = make(options, &session, calibration, made_from, watch, (progress, page))?;
+    Ok(Solved { report, up_to_date: false })
+}
+
+/// What the report says of the inputs.
+struct MadeFrom {
+    key: String,
+    inputs: Vec<Input>,
+}
+
+fn make(
+    options: &Options,
+    session: &Session,
+    calibration: Calibration,
+    made_from: MadeFrom,
+    mut watch: Stopwatch,
+    (progress, page): (&(dyn Fn(Progress) + Sync), Option<Page>),
+) -> Result<Report, SolveError> {
     // Before the work: a place that cannot be written is told at once.
     let staged = StagedFolder::create(&options.out, OUTPUT)?;
-    let Loaded { scene, mut warnings } = load(options, &session, calibration, progress)?;
+    let Loaded { mut scene, mut warnings } = load(options, session, calibration, progress)?;
     watch.lap(Stage::Read);
+    warnings.extend(leave_out_dark_lights(&mut scene)?);
     let (maps, of_solve) = solve_scene(&scene, options.method, progress)?;
     warnings.extend(of_solve);
     watch.lap(Stage::Solve);
@@ -91,7 +130,11 @@ fn run_on_this_pool(
     write_maps(staged.path(), &finished, options.normal_y, progress)?;
     copy_camera(&rest, options, staged.path())?;
     watch.lap(Stage::Write);
-    let mut report = report(options, &rest, &finished, counts, &watch, warnings, inputs);
+    let mut report = report(options, &rest, &finished, counts);
+    report.warnings = warnings;
+    report.inputs = made_from.inputs;
+    report.key = Some(made_from.key);
+    report.seconds = watch.seconds.clone();
     if let Some(page) = page {
         let shown =
             Shown { name: &session.name, maps: &finished, frames: &frames, report: &report };
@@ -167,15 +210,7 @@ fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), Solv
     Ok(())
 }
 
-fn report(
-    options: &Options,
-    rest: &Rest,
-    maps: &Finished,
-    counts: Counts,
-    watch: &Stopwatch,
-    warnings: Vec<String>,
-    inputs: Vec<Input>,
-) -> Report {
+fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Report {
     let undistorted = options.grid == Grid::Undistorted;
     let camera = rest
         .camera
@@ -193,7 +228,7 @@ fn report(
         saturated_pixels: counts.saturated as u64,
         outcomes: outcomes(&counts),
         residual_rms: (counts.solved() > 0).then(|| counts.residual_rms()),
-        seconds: watch.seconds.clone(),
+        seconds: BTreeMap::new(),
         mm_per_px: camera.and_then(|camera| mm_per_px(&camera, &rest.plane)),
         undistorted,
         plane: PlaneReport {
@@ -201,8 +236,8 @@ fn report(
             normal: rest.plane.normal.into_inner().into(),
         },
         color_space: color_space(&rest.color).to_owned(),
-        warnings,
-        inputs,
+        warnings: vec![],
+        inputs: vec![],
         key: None,
     }
 }
@@ -253,20 +288,17 @@ fn inputs(session: &Session, calibration: &Calibration) -> Result<Vec<Input>, So
 
 /// Seconds per stage.
 struct Stopwatch {
-    begun: Instant,
     lap: Instant,
     seconds: BTreeMap<String, f64>,
 }
 
 impl Stopwatch {
     fn start() -> Self {
-        let now = Instant::now();
-        Self { begun: now, lap: now, seconds: BTreeMap::new() }
+        Self { lap: Instant::now(), seconds: BTreeMap::new() }
     }
 
     fn lap(&mut self, stage: Stage) {
         self.seconds.insert(stage.name().to_owned(), self.lap.elapsed().as_secs_f64());
         self.lap = Instant::now();
-        self.seconds.insert("total".to_owned(), self.begun.elapsed().as_secs_f64());
     }
 }

@@ -44,7 +44,9 @@ impl Folders {
 
     fn options(&self) -> Options {
         let root = self.root.path();
-        Options::new(root.join("session"), root.join("calibration"), root.join("out"))
+        let options =
+            Options::new(root.join("session"), root.join("calibration"), root.join("out"));
+        Options { reuse: Reuse::Never, ..options }
     }
 
     fn run(&self, options: &Options) -> BTreeMap<String, Vec<u8>> {
@@ -190,8 +192,8 @@ fn what_does_not_belong_together_is_told_with_the_remedy() {
         samples.truncate(12 * 6);
         exposure.frame.height = 6;
     };
-    check("is 12 x 6 a RGGB mosaic", &|scene| crop(&mut scene.lights[4].exposures[0]));
-    check("is 12 x 6 a RGGB mosaic", &|scene| crop(&mut scene.ambient[0]));
+    check("is 12 x 6 RGGB mosaic", &|scene| crop(&mut scene.lights[4].exposures[0]));
+    check("is 12 x 6 RGGB mosaic", &|scene| crop(&mut scene.ambient[0]));
     check("is 12 x 8 grey", &|scene| scene.lights[9].exposures[0].frame.layout = Layout::Grey);
     check("use the calibration of this camera", &|scene| {
         scene.camera.as_mut().unwrap().width_px = 14;
@@ -246,7 +248,7 @@ fn a_light_without_a_frame_and_a_light_that_drifts_are_warned_about() {
     folders.session.frames[2].drift_check = true;
     folders.session.frames.remove(4);
     folders.session.save().unwrap();
-    let report = run(&folders.options(), &|_| {}).unwrap();
+    let report = run(&folders.options(), &|_| {}).unwrap().report;
     assert_eq!(report.lights_used, [0, 1, 2, 4]);
     let warnings = report.warnings.join("\n");
     assert!(warnings.contains("Light 3 has no frame"), "{warnings}");
@@ -305,4 +307,31 @@ fn undistorted_maps_belong_to_a_pinhole() {
         compared += 1;
     }
     assert_eq!(compared, 4);
+}
+
+#[test]
+fn what_is_up_to_date_is_not_made_again() {
+    let mut folders =
+        Folders::of(&scene(Recipe { width: 12, height: 8, lights: 5, ..Recipe::default() }));
+    let options = Options { reuse: Reuse::IfCurrent, ..folders.options() };
+    let check = |what: &str, options: &Options, expected: bool| {
+        let solved = run(options, &|_| {}).unwrap();
+        assert_eq!(solved.up_to_date, expected, "{what}");
+        let on_disk = solution::Solution::load(&options.out).unwrap().report;
+        assert_eq!(solved.report, on_disk, "{what}");
+    };
+    check("nothing there", &options, false);
+    check("the same again", &options, true);
+    check("another number of threads", &Options { threads: Some(2), ..options.clone() }, true);
+    let robust = Options { method: Method::LeastSquares, ..options.clone() };
+    check("another method", &robust, false);
+    check("that method again", &robust, true);
+    check("asked to", &Options { reuse: Reuse::Never, ..robust.clone() }, false);
+    std::fs::remove_file(options.out.join("albedo.png")).unwrap();
+    check("a map is missing", &robust, false);
+    folders.session.name = "renamed".into();
+    folders.session.save().unwrap();
+    check("another manifest", &robust, false);
+    std::fs::write(folders.session.frame_path(&folders.session.frames[0]), b"altered").unwrap();
+    assert!(run(&robust, &|_| {}).unwrap_err().to_string().contains("altered"));
 }

@@ -1,4 +1,5 @@
 mod folders;
+mod previews;
 mod scenes;
 
 use super::bands::Run;
@@ -6,7 +7,7 @@ use super::in_memory::{light_field, noise};
 use super::reference::solve_exactly;
 use super::*;
 use crate::photometry::{Method, Outcome, Pixel};
-use crate::raw::Layout;
+use crate::raw::{Layout, Samples};
 use nalgebra::Vector3;
 use scenes::{Recipe, albedo_at, normal_at, scene};
 use weavelight_calibration::description::Cfa;
@@ -124,4 +125,44 @@ fn one_pixel_is_a_picture() {
     let maps = solve(&scene(Recipe { width: 1, height: 1, ..Recipe::default() }), Method::Weighted);
     assert_eq!(maps.counts.solved(), 1);
     assert_eq!(maps.counts.of(Outcome::Fitted), 1);
+}
+
+#[test]
+fn lights_that_contradict_the_others_are_named() {
+    let check = |expected: &[&str], left_out: &[usize], change: &dyn Fn(&mut Scene)| {
+        for seed in 20..24 {
+            let mut scene = scene(Recipe { seed, ..Recipe::default() });
+            change(&mut scene);
+            let warnings = leave_out_dark_lights(&mut scene).unwrap().join("\n");
+            let told = expected.iter().all(|part| warnings.contains(part));
+            assert!(
+                told && warnings.is_empty() == expected.is_empty(),
+                "{expected:?}, got: {warnings}"
+            );
+            let left: Vec<usize> = scene.lights.iter().map(|light| light.index).collect();
+            let right = (0..10).filter(|index| !left_out.contains(index));
+            assert!(right.eq(left.iter().copied()) || scene.lights.len() < 9, "{left:?}");
+        }
+    };
+    let dim = |scene: &mut Scene, light: usize, share: f64| {
+        let Samples::U16(samples) = &mut scene.lights[light].exposures[0].frame.samples else {
+            panic!()
+        };
+        samples.iter_mut().for_each(|v| *v = 600 + (f64::from(*v - 600) * share) as u16);
+    };
+    check(&[], &[], &|_| {});
+    check(&["Light 4 gives 0.0 %", "left out"], &[4], &|scene| dim(scene, 4, 0.0));
+    check(&["Light 7 gives 30 %"], &[], &|scene| dim(scene, 7, 0.3));
+    check(&["Light 1 gives 0.0 %", "Light 8 gives 0.0 %"], &[1, 8], &|scene| {
+        dim(scene, 1, 0.0);
+        dim(scene, 8, 0.0);
+    });
+    for (a, b) in [(0, 1), (2, 9), (5, 6)] {
+        check(&[&format!("Lights {a} and {b} seem to be swapped")], &[], &|scene| {
+            let frame = std::mem::take(&mut scene.lights[a].exposures);
+            let other = std::mem::replace(&mut scene.lights[b].exposures, frame);
+            scene.lights[a].exposures = other;
+        });
+    }
+    check(&["With three lights nothing can tell"], &[], &|scene| scene.lights.truncate(3));
 }

@@ -1,0 +1,72 @@
+//! What is up to date is not made again: a solution remembers the hash of everything it was made from.
+
+use super::{Options, SolveError};
+use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
+use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE};
+use crate::session::Session;
+use crate::solution::{self, REPORT_JSON, Report};
+use rayon::prelude::*;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Files that a solution always has.
+const ALWAYS: [&str; 6] = [
+    solution::NORMAL_EXR,
+    solution::ALBEDO_EXR,
+    solution::CONFIDENCE_EXR,
+    solution::NORMAL_PNG,
+    solution::ALBEDO_PNG,
+    solution::MASK_PNG,
+];
+
+/// Hash of inputs and settings together: the program's version, the settings, the manifest (which holds the frames'
+/// hashes), frames whose hash it lacks, the calibration's files and the mask.
+pub(crate) fn key(
+    options: &Options,
+    session: &Session,
+    calibration: &Calibration,
+) -> Result<String, SolveError> {
+    let mut text =
+        format!("{PROGRAM} {:?} {:?} {:?}", options.method, options.grid, options.normal_y);
+    let unhashed = session.frames.iter().filter(|frame| frame.sha256.is_none());
+    let mut files = vec![session.manifest_path()];
+    files.extend(unhashed.map(|frame| session.frame_path(frame)));
+    files.extend(calibration_files(&calibration.folder)?);
+    files.extend(options.mask.clone().or_else(|| session.mask_path()));
+    let hashes: Vec<Result<String, FileError>> =
+        files.par_iter().map(|path| sha256_of_file(path)).collect();
+    for hash in hashes {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "\n{}", hash?);
+    }
+    Ok(sha256_hex(text.as_bytes()))
+}
+
+/// The calibration's three files and its gain maps, by name.
+fn calibration_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let failed = |source| FileError::read(folder, source);
+    let entries = std::fs::read_dir(folder).map_err(failed)?;
+    let mut paths = entries
+        .map(|entry| Ok(entry.map_err(failed)?.path()))
+        .collect::<Result<Vec<_>, FileError>>()?;
+    paths.retain(|path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        path.is_file()
+            && ([CAMERA_FILE, COLOR_FILE, LIGHTS_FILE].contains(&&*name) || name.ends_with(".exr"))
+    });
+    paths.sort();
+    Ok(paths)
+}
+
+/// The report of the solution that stands at `out`, if it is whole, has this key, and every frame still is what the
+/// manifest says; with the page, where one is asked for.
+pub(crate) fn still_current(out: &Path, key: &str, session: &Session, with_page: bool) -> Option<Report> {
+    let report = Report::read(&out.join(REPORT_JSON)).ok()?;
+    let there = |name: &&str| out.join(name).is_file();
+    let whole = ALWAYS.iter().all(|name| there(name)) && (!with_page || there(&solution::REPORT_HTML));
+    let same = whole && report.key.as_deref() == Some(key);
+    // Of a frame that was altered, reading it will tell.
+    let unaltered =
+        same && session.frames.par_iter().all(|frame| session.read_frame(frame).is_ok());
+    unaltered.then_some(report)
+}
