@@ -8,6 +8,7 @@ mod gui;
 mod import;
 mod output;
 mod progress;
+mod solve;
 #[cfg(test)]
 mod tests;
 
@@ -28,6 +29,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Solve(solve::Args),
     Import(import::Args),
     Compare(compare::Args),
     Doctor(doctor::Args),
@@ -37,6 +39,7 @@ enum Command {
 impl Command {
     fn run(&self) -> Result<Output, Failure> {
         match self {
+            Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Doctor(args) => doctor::run(args),

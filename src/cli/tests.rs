@@ -40,6 +40,13 @@ fn calls_are_understood_or_refused() {
         true,
     );
     check("weavelight import a.png --out s", false);
+    check(
+        "weavelight solve s --calibration c --out m --method least-squares --undistort --normal-y down",
+        true,
+    );
+    check("weavelight solve s --calibration c --out m --method best", false);
+    check("weavelight solve s --out m", false);
+    check("weavelight solve s --calibration c --out m --threads 0", false);
     check("weavelight doctor", true);
     check("weavelight gui", true);
     check("weavelight fly", false);

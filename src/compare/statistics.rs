@@ -12,7 +12,7 @@ mod tests {
     #[test]
     fn quantiles_of_small_sets() {
         let check = |sorted: &[f64], share: f64, expected: Option<f64>| {
-            assert_eq!(percentile(sorted, share), expected)
+            assert_eq!(percentile(sorted, share), expected);
         };
         check(&[], 0.5, None);
         check(&[3.0], 0.95, Some(3.0));

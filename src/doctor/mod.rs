@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn memory_is_read_from_the_kernels_text() {
         let check = |text: &str, expected: Option<u64>| {
-            assert_eq!(available_memory_mb(text), expected, "{text:?}")
+            assert_eq!(available_memory_mb(text), expected, "{text:?}");
         };
         check("MemTotal: 16000000 kB\nMemAvailable:    2048000 kB\n", Some(2000));
         check("MemTotal: 16000000 kB\n", None);

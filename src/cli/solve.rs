@@ -1,0 +1,131 @@
+//! `weavelight solve`
+
+use super::output::{Failure, Output};
+use super::progress::Progress;
+use crate::photometry::Method;
+use crate::solution::Report;
+use crate::solve::{self, Grid, NormalY, Options, Stage};
+use clap::ValueEnum;
+use std::path::PathBuf;
+
+/// Turn a capture session into normal, albedo and confidence maps
+///
+/// An earlier solution at DIR is replaced when the new one is whole.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  weavelight solve linen-4021 --calibration calibration --out linen-4021-maps"
+)]
+pub(super) struct Args {
+    /// Capture session: folder with session.toml and frames
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// Calibration folder
+    #[arg(long, value_name = "CALIB")]
+    calibration: PathBuf,
+    /// Folder to write
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// How each photosite's normal is found
+    #[arg(long, default_value = "auto")]
+    method: MethodName,
+    /// Take the lens's distortion out of the maps
+    #[arg(long)]
+    undistort: bool,
+    /// Where green points in normal.png
+    #[arg(long, default_value = "up")]
+    normal_y: NormalYName,
+    /// Picture that is not black where to solve, instead of the capture session's own
+    #[arg(long, value_name = "M.png")]
+    mask: Option<PathBuf>,
+    /// Threads to use [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum MethodName {
+    /// Weighted by the noise; shadows and highlights looked for where the residual asks for it
+    Auto,
+    /// Plain: every unsaturated sample, all of equal weight
+    LeastSquares,
+    /// Weighted; shadows and highlights looked for at every photosite
+    Robust,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum NormalYName {
+    /// OpenGL
+    Up,
+    /// DirectX
+    Down,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Auto => Self::Auto,
+            MethodName::LeastSquares => Self::LeastSquares,
+            MethodName::Robust => Self::Robust,
+        }
+    }
+}
+
+impl Args {
+    fn options(&self) -> Options {
+        let mut options = Options::new(&self.session, &self.calibration, &self.out);
+        options.method = self.method.into();
+        options.grid = if self.undistort { Grid::Undistorted } else { Grid::Sensor };
+        options.normal_y = match self.normal_y {
+            NormalYName::Up => NormalY::Up,
+            NormalYName::Down => NormalY::Down,
+        };
+        options.mask.clone_from(&self.mask);
+        options.threads = self.threads.map(usize::from);
+        options
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<Output, Failure> {
+    let progress = Progress::new();
+    let solved =
+        solve::run(&args.options(), &|state| show(&progress, state)).map_err(Failure::work)?;
+    drop(progress);
+    let report = solved.report;
+    let up_to_date = if solved.up_to_date { "up to date, " } else { "" };
+    Ok(Output {
+        text: format!("{}: {up_to_date}{}", args.out.display(), text(&report)),
+        json: serde_json::to_value(&report).map_err(Failure::work)?,
+        warnings: report.warnings,
+        status: 0,
+    })
+}
+
+/// Shows a solve's stage on the bar; the stages' lengths are about those of a full-size run.
+pub(super) fn show(progress: &Progress, state: solve::Progress) {
+    let (start, length, what) = match state.stage {
+        Stage::Read => (0.0, 0.3, "reading frames"),
+        Stage::Solve => (0.3, 0.4, "solving"),
+        Stage::Colour => (0.7, 0.1, "finding colours"),
+        Stage::Write => (0.8, 0.2, "writing maps"),
+    };
+    let share = state.done as f64 / state.total.max(1) as f64;
+    progress.set(start + length * share, what);
+}
+
+fn text(report: &Report) -> String {
+    let percent = |count: u64| 100.0 * count as f64 / report.pixels.max(1) as f64;
+    let scale =
+        report.mm_per_px.map_or_else(String::new, |scale| format!(", {scale:.4} mm per pixel"));
+    let seconds: f64 = report.seconds.values().sum();
+    format!(
+        "{:.1} % of {} photosites solved from {} lights{scale}\n\
+         robust path {:.2} %, clipped samples at {:.2} %, residual {:.5} of white, albedo in {}, {seconds:.1} s",
+        percent(report.solved),
+        report.pixels,
+        report.lights_used.len(),
+        percent(report.robust_pixels),
+        percent(report.saturated_pixels),
+        report.residual_rms.unwrap_or(0.0),
+        report.color_space,
+    )
+}
