@@ -3,8 +3,9 @@
 use super::output::{Failure, Output};
 use super::progress::Progress;
 use crate::photometry::Method;
+use crate::report::page_of_solve;
 use crate::solution::Report;
-use crate::solve::{self, Grid, NormalY, Options, Stage};
+use crate::solve::{self, Grid, NormalY, Options, Shown, Stage};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -87,8 +88,10 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let progress = Progress::new();
+    let page = |shown: &Shown| page_of_solve(shown, None);
     let solved =
-        solve::run(&args.options(), &|state| show(&progress, state)).map_err(Failure::work)?;
+        solve::run_with_page(&args.options(), &|state| show(&progress, state), Some(&page))
+            .map_err(Failure::work)?;
     drop(progress);
     let report = solved.report;
     let up_to_date = if solved.up_to_date { "up to date, " } else { "" };
@@ -106,7 +109,8 @@ pub(super) fn show(progress: &Progress, state: solve::Progress) {
         Stage::Read => (0.0, 0.3, "reading frames"),
         Stage::Solve => (0.3, 0.4, "solving"),
         Stage::Colour => (0.7, 0.1, "finding colours"),
-        Stage::Write => (0.8, 0.2, "writing maps"),
+        Stage::Write => (0.8, 0.15, "writing maps"),
+        Stage::Page => (0.95, 0.05, "writing the page"),
     };
     let share = state.done as f64 / state.total.max(1) as f64;
     progress.set(start + length * share, what);

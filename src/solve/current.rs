@@ -60,10 +60,16 @@ fn calibration_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
 
 /// The report of the solution that stands at `out`, if it is whole, has this key, and every frame still is what the
 /// manifest says; with the page, where one is asked for.
-pub(crate) fn still_current(out: &Path, key: &str, session: &Session, with_page: bool) -> Option<Report> {
+pub(crate) fn still_current(
+    out: &Path,
+    key: &str,
+    session: &Session,
+    with_page: bool,
+) -> Option<Report> {
     let report = Report::read(&out.join(REPORT_JSON)).ok()?;
     let there = |name: &&str| out.join(name).is_file();
-    let whole = ALWAYS.iter().all(|name| there(name)) && (!with_page || there(&solution::REPORT_HTML));
+    let whole =
+        ALWAYS.iter().all(|name| there(name)) && (!with_page || there(&solution::REPORT_HTML));
     let same = whole && report.key.as_deref() == Some(key);
     // Of a frame that was altered, reading it will tell.
     let unaltered =
