@@ -13,6 +13,7 @@
 //! - [`device`]: the light board, and what else the capture needs of the world
 //! - [`report`]: what a command tells
 
+pub mod calibrate;
 pub mod cli;
 pub mod compare;
 pub mod device;

@@ -2,6 +2,7 @@
 //!
 //! Exit status: 0 done, 1 the work failed, 2 the call was wrong.
 
+mod calibrate;
 mod compare;
 mod doctor;
 mod gui;
@@ -31,6 +32,7 @@ struct Cli {
 enum Command {
     Solve(solve::Args),
     Import(import::Args),
+    Calibrate(calibrate::Args),
     Compare(compare::Args),
     Doctor(doctor::Args),
     Gui(gui::Args),
@@ -41,6 +43,7 @@ impl Command {
         match self {
             Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
+            Command::Calibrate(args) => calibrate::run(args),
             Command::Compare(args) => compare::run(args),
             Command::Doctor(args) => doctor::run(args),
             Command::Gui(args) => gui::run(args),

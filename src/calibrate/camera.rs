@@ -1,0 +1,303 @@
+//! `calibrate camera`: intrinsics, distortion and the table's pose from pictures of a chessboard.
+
+use super::boards::{self, shape_of};
+use super::frames::{check_size, grey_picture, read_frame};
+use super::{CalibrateError, Inputs, Progress};
+use crate::files::Provenance;
+use crate::instrument::{Rig, write_camera};
+use crate::session::{Board, FrameEntry, Kind, Session};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use weavelight_calibration::board::{BoardShape, BoardView, camera_on_table, coverage};
+use weavelight_calibration::description::{Camera, Plane};
+
+/// What to calibrate from.
+#[derive(Clone, Debug)]
+pub struct CameraOptions {
+    /// `rig.toml`.
+    pub rig: PathBuf,
+    /// Board capture sessions.
+    pub sessions: Vec<PathBuf>,
+    /// The calibration folder to add to.
+    pub out: PathBuf,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Serialize)]
+pub struct CameraReport {
+    /// fx, fy, cx, cy in pixels.
+    pub intrinsics_px: [f64; 4],
+    /// k1, k2, p1, p2, k3.
+    pub distortion: [f64; 5],
+    /// One sigma of the four and of the five.
+    pub sigma: [f64; 9],
+    /// Root mean square reprojection error over the boards kept.
+    pub rms_reprojection_px: f64,
+    /// Every picture of the board.
+    pub boards: Vec<BoardReport>,
+    /// Corners in each field of an 8 x 6 grid over the picture, row by row.
+    pub coverage: Vec<usize>,
+    /// Camera above the table, millimetres.
+    pub height_mm: f64,
+    /// Sentences.
+    pub warnings: Vec<String>,
+}
+
+/// One picture of the board.
+#[derive(Clone, Debug, Serialize)]
+pub struct BoardReport {
+    /// Its file, below the capture session.
+    pub file: String,
+    /// Reprojection error, where it was found.
+    pub rms_px: Option<f64>,
+    /// Why it was left out.
+    pub dropped: Option<String>,
+}
+
+const COVERAGE_GRID: [usize; 2] = [8, 6];
+
+/// One picture to look for the board in.
+struct Picture<'a> {
+    session: &'a Session,
+    entry: &'a FrameEntry,
+}
+
+impl Picture<'_> {
+    fn path(&self) -> PathBuf {
+        self.session.frame_path(self.entry)
+    }
+
+    fn name(&self) -> String {
+        format!("{}/{}", self.session.name, self.entry.file.display())
+    }
+}
+
+/// Calibrates the camera and writes `camera.toml`.
+///
+/// # Errors
+/// Where a frame or the board cannot be read, the boards do not carry a camera, or the file cannot be written.
+pub fn camera(
+    options: &CameraOptions,
+    progress: &Progress,
+) -> Result<CameraReport, CalibrateError> {
+    let rig = Rig::load(&options.rig)?;
+    let sessions: Vec<Session> =
+        options.sessions.iter().map(|path| Session::load(path)).collect::<Result<_, _>>()?;
+    let board = common_board(&sessions)?;
+    let shape = shape_of(&board);
+    let pictures: Vec<Picture> = sessions
+        .iter()
+        .flat_map(|session| session.frames.iter().map(move |entry| Picture { session, entry }))
+        .collect();
+    let size = [rig.camera.width_px, rig.camera.height_px];
+    progress(0.0, "looking for the board");
+    let found = find_all(&pictures, &shape, &options.rig, size, progress)?;
+    if found.iter().all(Option::is_none) {
+        return Err(none_found(&pictures, &shape));
+    }
+    let table = table_picture(&sessions, &pictures);
+    let used: Vec<usize> = (0..pictures.len()).filter(|k| found[*k].is_some()).collect();
+    let views: Vec<BoardView> = found.iter().flatten().cloned().collect();
+    progress(0.8, "fitting the camera");
+    let (fit, kept, dropped) = boards::fit(&views, &shape, size)?;
+    let pictures_kept: Vec<usize> = kept.iter().map(|view| used[*view]).collect();
+    let Some(table_view) = pictures_kept.iter().position(|k| *k == table) else {
+        let what =
+            "the board on the table was not found, or not read well enough to fix the rig frame";
+        let remedy =
+            "photograph it again: flat on the table, centred, whole and sharp in the picture";
+        return Err(CalibrateError::target(pictures[table].path(), what, remedy));
+    };
+    let plane = pictures[table].session.plane.clone().unwrap_or_else(Plane::table);
+    let camera = camera_on_table(&fit, table_view, &plane, size);
+    let mut boards: Vec<BoardReport> = pictures.iter().map(not_found).collect();
+    for (view, rms) in kept.iter().zip(&fit.view_rms_px) {
+        boards[used[*view]] =
+            BoardReport { file: pictures[used[*view]].name(), rms_px: Some(*rms), dropped: None };
+    }
+    for outlier in &dropped {
+        boards[used[outlier.view]] =
+            outlier_report(&pictures[used[outlier.view]], outlier.rms_px, outlier.typical_px);
+    }
+    let kept_views: Vec<BoardView> = kept.iter().map(|view| views[*view].clone()).collect();
+    let mut report = CameraReport {
+        intrinsics_px: fit.intrinsics,
+        distortion: fit.distortion,
+        sigma: fit.sigma,
+        rms_reprojection_px: fit.rms_px,
+        boards,
+        coverage: coverage(&kept_views, size, COVERAGE_GRID),
+        height_mm: centre_height(&camera),
+        warnings: Vec::new(),
+    };
+    report.warnings = warnings(&report, &rig, size);
+    let provenance = Provenance::of_this_program(
+        Some(jiff::Timestamp::now()),
+        Inputs::of(&options.rig, &sessions)?,
+        quality(&report),
+    );
+    write_camera(&options.out, &camera, Some(fit.rms_px), &provenance)?;
+    progress(1.0, "done");
+    Ok(report)
+}
+
+/// All capture sessions must show the same board.
+fn common_board(sessions: &[Session]) -> Result<Board, CalibrateError> {
+    let mut common = None;
+    for session in sessions {
+        let place = session.manifest_path();
+        if session.kind != Kind::Board {
+            return Err(CalibrateError::WrongKind { session: place, expected: "board" });
+        }
+        let Some(board) = session.target.as_ref().and_then(|target| target.board) else {
+            let remedy =
+                "add board = { columns = ..., rows = ..., square_mm = ... } (inner corners)";
+            return Err(CalibrateError::target(place, "[target] names no board", remedy));
+        };
+        if common.is_some_and(|common| common != board) {
+            let remedy = "calibrate from pictures of one board";
+            return Err(CalibrateError::target(
+                place,
+                "this board differs from the other sessions'",
+                remedy,
+            ));
+        }
+        common = Some(board);
+    }
+    common.ok_or_else(|| {
+        CalibrateError::target(
+            "",
+            "no capture session was given",
+            "name at least one board capture session",
+        )
+    })
+}
+
+fn find_all(
+    pictures: &[Picture],
+    shape: &BoardShape,
+    rig: &Path,
+    size: [usize; 2],
+    progress: &Progress,
+) -> Result<Vec<Option<BoardView>>, CalibrateError> {
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    pictures
+        .par_iter()
+        .with_max_len(1)
+        .map(|picture| {
+            let frame = read_frame(picture.session, picture.entry)?;
+            check_size(&picture.path(), &frame, rig, size)?;
+            let view = boards::detect(&grey_picture(&frame), shape);
+            let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            progress(0.8 * done as f64 / pictures.len() as f64, "looking for the board");
+            view
+        })
+        .collect()
+}
+
+/// Says whether another size would have been found.
+fn none_found(pictures: &[Picture], shape: &BoardShape) -> CalibrateError {
+    let place = pictures[0].session.manifest_path();
+    let (columns, rows) = (shape.columns, shape.rows);
+    let what = format!("no picture shows a complete board of {columns} x {rows} inner corners");
+    let remedy = match other_size(&pictures[0], shape) {
+        Some([columns, rows]) => {
+            format!("{} shows one of {columns} x {rows}: correct columns and rows", pictures[0].name())
+        }
+        None => "check columns and rows (inner corners, one less than squares), and photograph the whole board, sharp and evenly lit".to_owned(),
+    };
+    CalibrateError::target(place, what, remedy)
+}
+
+fn other_size(picture: &Picture, shape: &BoardShape) -> Option<[usize; 2]> {
+    let grey = grey_picture(&read_frame(picture.session, picture.entry).ok()?);
+    let near = |n: usize| [n.wrapping_sub(1), n, n + 1, n.wrapping_sub(2), n + 2];
+    let sizes = near(shape.columns).into_iter().flat_map(|c| near(shape.rows).map(|r| [c, r]));
+    let possible = sizes.filter(|size| size.iter().all(|n| (3..100).contains(n)));
+    let shows = |[columns, rows]: &[usize; 2]| {
+        let shape = BoardShape { columns: *columns, rows: *rows, ..*shape };
+        matches!(boards::detect(&grey, &shape), Ok(Some(_)))
+    };
+    // A smaller board is found within a larger one: the largest that is found is the board.
+    possible.filter(shows).max_by_key(|[columns, rows]| columns * rows)
+}
+
+/// The frame with `pose = "table"`, else the first one listed.
+fn table_picture(sessions: &[Session], pictures: &[Picture]) -> usize {
+    let _ = sessions;
+    pictures.iter().position(|p| p.entry.pose.as_deref() == Some("table")).unwrap_or(0)
+}
+
+fn not_found(picture: &Picture) -> BoardReport {
+    let dropped = "no complete board was found: cut off, covered, blurred or badly lit";
+    BoardReport { file: picture.name(), rms_px: None, dropped: Some(dropped.to_owned()) }
+}
+
+fn outlier_report(picture: &Picture, rms_px: f64, typical_px: f64) -> BoardReport {
+    let why = format!(
+        "its corners are off by {rms_px:.2} px where {typical_px:.2} px is usual: moved, blurred, bent or misread"
+    );
+    BoardReport { file: picture.name(), rms_px: Some(rms_px), dropped: Some(why) }
+}
+
+fn centre_height(camera: &Camera) -> f64 {
+    camera.camera_from_rig.inverse_transform_point(&nalgebra::Point3::origin()).z
+}
+
+/// Departure of height or focal length from the rig's that deserves a word.
+const RULER_TOLERANCE: f64 = 0.1;
+
+fn warnings(report: &CameraReport, rig: &Rig, size: [usize; 2]) -> Vec<String> {
+    let mut out: Vec<String> = report
+        .boards
+        .iter()
+        .filter_map(|board| {
+            board.dropped.as_ref().map(|why| format!("{} was left out: {why}", board.file))
+        })
+        .collect();
+    let empty = report.coverage.iter().filter(|count| **count == 0).count();
+    if empty * 4 > report.coverage.len() {
+        out.push(format!(
+            "no corner lies in {empty} of {} fields of the picture; photograph the board near the edges and corners too",
+            report.coverage.len()
+        ));
+    }
+    let [fx, fy, ..] = report.intrinsics_px;
+    if report.sigma[0] > 1e-3 * fx || report.sigma[1] > 1e-3 * fy {
+        out.push("the focal length is uncertain by more than 0.1 %; add boards tilted by 30 to 40 degrees".to_owned());
+    }
+    if let Some(height) =
+        rig.camera.height_mm.filter(|h| (report.height_mm / h - 1.0).abs() > RULER_TOLERANCE)
+    {
+        out.push(format!(
+            "the camera stands {:.0} mm over the table, the rig file says {height:.0}; check square_mm and the ruler",
+            report.height_mm
+        ));
+    }
+    if let (Some(focal), Some(pitch)) = (rig.camera.focal_length_mm, rig.camera.pixel_pitch_um) {
+        let expected = focal / pitch * 1000.0;
+        if (fx / expected - 1.0).abs() > RULER_TOLERANCE {
+            out.push(format!(
+                "the focal length is {fx:.0} px, the rig file's lens gives {expected:.0} at {} x {}; is this the lens of the rig?",
+                size[0], size[1]
+            ));
+        }
+    }
+    out
+}
+
+fn quality(report: &CameraReport) -> toml::Table {
+    let kept = report.boards.iter().filter(|board| board.dropped.is_none()).count();
+    let mut table = toml::Table::new();
+    table.insert("boards_kept".into(), toml::Value::Integer(kept as i64));
+    table
+        .insert("boards_dropped".into(), toml::Value::Integer((report.boards.len() - kept) as i64));
+    let names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
+    for (name, sigma) in names.iter().zip(report.sigma) {
+        table.insert(format!("{name}_sigma"), toml::Value::Float(sigma));
+    }
+    let counts = report.coverage.iter().map(|count| toml::Value::Integer(*count as i64)).collect();
+    table.insert("coverage_8x6".into(), toml::Value::Array(counts));
+    table
+}

@@ -1,0 +1,213 @@
+//! Frames of targets: read, made linear, averaged over rectangles.
+
+use super::CalibrateError;
+use crate::instrument::Color;
+use crate::raw::{Encoding, Frame, Hint, Layout, ReadError, Samples, decode};
+use crate::session::{self, FrameEntry, Session};
+use std::path::Path;
+use weavelight_calibration::description::Image;
+
+/// Reads one frame, its hash checked.
+pub(super) fn read_frame(session: &Session, entry: &FrameEntry) -> Result<Frame, CalibrateError> {
+    let bytes = session.read_frame(entry)?;
+    let encoding = entry.encoding.map(|encoding| match encoding {
+        session::Encoding::Linear => Encoding::Linear,
+        session::Encoding::Srgb => Encoding::Srgb,
+    });
+    decode(&bytes, &Hint { cfa: entry.cfa, encoding })
+        .map_err(|source| ReadError::Decode { path: session.frame_path(entry), source }.into())
+}
+
+/// Exposure time times ISO / 100.
+pub(super) fn seconds_at_iso_100(entry: &FrameEntry) -> f64 {
+    entry.exposure_s * entry.iso / 100.0
+}
+
+/// The frame must have the size that `stated_in` says.
+pub(super) fn check_size(
+    path: &Path,
+    frame: &Frame,
+    stated_in: &Path,
+    expected: [usize; 2],
+) -> Result<(), CalibrateError> {
+    let found = [frame.width, frame.height];
+    if found == expected {
+        return Ok(());
+    }
+    let (frame, rig) = (path.to_owned(), stated_in.to_owned());
+    Err(CalibrateError::WrongSize { frame, found, rig, expected })
+}
+
+/// How raw numbers become light: per place of the 2 x 2 cell.
+#[derive(Clone, Debug)]
+pub(super) struct Levels {
+    pub(super) black: [f64; 4],
+    pub(super) saturation: [f64; 4],
+    response: Vec<f64>,
+}
+
+impl Levels {
+    /// The calibration's levels override the file's; a format without a ceiling counts 1.0 as full scale.
+    pub(super) fn of(frame: &Frame, color: &Color) -> Self {
+        let black = color.black_level.unwrap_or(frame.black.map(f64::from));
+        let stated =
+            color.saturation_level.map_or(frame.saturation.map(f64::from), |level| [level; 4]);
+        Self { black, saturation: stated, response: color.response.clone() }
+    }
+
+    pub(super) fn range(&self, place: usize) -> f64 {
+        let range = self.saturation[place] - self.black[place];
+        if range.is_finite() { range } else { 1.0 }
+    }
+
+    /// Light as a fraction of full scale of a raw number; `None` where it is saturated.
+    pub(super) fn linear(&self, raw: f64, place: usize) -> Option<f64> {
+        let usable = raw.is_finite() && raw < self.saturation[place];
+        usable.then(|| self.bent((raw - self.black[place]) / self.range(place)))
+    }
+
+    /// The response curve.
+    fn bent(&self, x: f64) -> f64 {
+        match self.response.as_slice() {
+            [] | [0.0, 1.0] => x,
+            response => response.iter().rev().fold(0.0, |sum, c| sum * x + c),
+        }
+    }
+}
+
+/// The raw number of one sample.
+pub(super) fn raw_at(frame: &Frame, x: usize, y: usize, channel: usize) -> f64 {
+    let at = (y * frame.width + x) * frame.layout.channels() + channel;
+    match &frame.samples {
+        Samples::U16(samples) => f64::from(samples[at]),
+        Samples::F32(samples) => f64::from(samples[at]),
+    }
+}
+
+/// A rectangle of pixels: x0, y0 inside, x1, y1 outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Rect {
+    pub(super) x: [usize; 2],
+    pub(super) y: [usize; 2],
+}
+
+/// Light in a rectangle per channel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Mean {
+    /// Mean of linear light, fraction of full scale; NaN where nothing is usable.
+    pub(super) value: [f64; 3],
+    /// Variance of one sample about that mean.
+    pub(super) variance: [f64; 3],
+    /// Samples.
+    pub(super) count: [f64; 3],
+    /// Share of saturated samples.
+    pub(super) saturated: f64,
+}
+
+/// Mean light of a rectangle. A grey frame gives three equal channels.
+pub(super) fn mean_in(frame: &Frame, levels: &Levels, rect: Rect) -> Mean {
+    let (mut sum, mut square, mut count) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    let (mut saturated, mut all) = (0.0, 0.0);
+    let mut add = |channel: usize, light: Option<f64>| {
+        all += 1.0;
+        match light {
+            Some(light) => {
+                sum[channel] += light;
+                square[channel] += light * light;
+                count[channel] += 1.0;
+            }
+            None => saturated += 1.0,
+        }
+    };
+    for y in rect.y[0]..rect.y[1].min(frame.height) {
+        for x in rect.x[0]..rect.x[1].min(frame.width) {
+            let place = (y & 1) * 2 + (x & 1);
+            match frame.layout {
+                Layout::Mosaic(cfa) => {
+                    add(cfa.cell[place] as usize, levels.linear(raw_at(frame, x, y, 0), place));
+                }
+                Layout::Grey => {
+                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, 0), place)))
+                }
+                Layout::Rgb => {
+                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, c), place)))
+                }
+            }
+        }
+    }
+    let value: [f64; 3] = std::array::from_fn(|k| sum[k] / count[k]);
+    let variance = std::array::from_fn(|k| (square[k] / count[k] - value[k] * value[k]).max(0.0));
+    Mean { value, variance, count, saturated: saturated / f64::max(all, 1.0) }
+}
+
+/// A picture for finding boards: all colours balanced, on the sensor's own grid. A mosaic is filtered with the binomial
+/// 3 x 3 kernel, which weighs the four colour places alike everywhere and moves nothing.
+pub(super) fn grey_picture(frame: &Frame) -> Image<f32> {
+    let (width, height) = (frame.width, frame.height);
+    let value = |x: usize, y: usize| match frame.layout {
+        Layout::Rgb => (0..3).map(|c| raw_at(frame, x, y, c)).sum::<f64>() as f32 / 3.0,
+        _ => raw_at(frame, x, y, 0) as f32,
+    };
+    let mut data: Vec<f32> = Vec::with_capacity(width * height);
+    for y in 0..height {
+        data.extend((0..width).map(|x| value(x, y)));
+    }
+    let mut image = Image { width, height, data };
+    if matches!(frame.layout, Layout::Mosaic(_)) {
+        balance(&mut image, &frame.black);
+        image = binomial(&image);
+    }
+    image
+}
+
+/// Scales the four places of the 2 x 2 cell to one mean above black.
+fn balance(image: &mut Image<f32>, black: &[f32; 4]) {
+    let mut sums = [(0.0f64, 0.0f64); 4];
+    for y in 0..image.height {
+        for (x, value) in image.row(y).iter().enumerate() {
+            let place = (y & 1) * 2 + (x & 1);
+            sums[place].0 += f64::from(value - black[place]);
+            sums[place].1 += 1.0;
+        }
+    }
+    let means = sums.map(|(sum, count)| (sum / f64::max(count, 1.0)).max(1e-6));
+    let width = image.width;
+    for (k, value) in image.data.iter_mut().enumerate() {
+        let place = ((k / width) & 1) * 2 + ((k % width) & 1);
+        *value = (*value - black[place]) * (means[1] / means[place]) as f32;
+    }
+}
+
+/// [1 2 1] x [1 2 1] / 16, borders mirrored (which keeps the colour places' weights).
+fn binomial(image: &Image<f32>) -> Image<f32> {
+    let (width, height) = (image.width, image.height);
+    let mirrored = |k: usize, step: isize, length: usize| {
+        let at = k as isize + step;
+        let last = length as isize - 1;
+        (if at < 0 {
+            -at
+        } else if at > last {
+            2 * last - at
+        } else {
+            at
+        })
+        .clamp(0, last) as usize
+    };
+    let mut across = image.clone();
+    for y in 0..height {
+        let row = image.row(y);
+        for x in 0..width {
+            across.data[y * width + x] =
+                0.25 * (row[mirrored(x, -1, width)] + 2.0 * row[x] + row[mirrored(x, 1, width)]);
+        }
+    }
+    let mut out = across.clone();
+    for y in 0..height {
+        let (above, below) =
+            (across.row(mirrored(y, -1, height)), across.row(mirrored(y, 1, height)));
+        for (x, value) in out.data[y * width..(y + 1) * width].iter_mut().enumerate() {
+            *value = 0.25 * (above[x] + 2.0 * across.row(y)[x] + below[x]);
+        }
+    }
+    out
+}

@@ -1,0 +1,35 @@
+//! From capture sessions of targets to a calibration: observations for the estimators, and what came of them.
+//!
+//! `calibrate camera`, `calibrate color` and `calibrate lights` each add one file to a calibration folder. A file is replaced
+//! only once its successor is whole: whatever fails, the old calibration stands.
+
+mod boards;
+mod camera;
+mod error;
+mod frames;
+
+pub use camera::{BoardReport, CameraOptions, CameraReport, camera};
+pub use error::CalibrateError;
+
+use crate::files::{FileError, Input, sha256_of_file};
+use crate::session::Session;
+use std::path::Path;
+
+/// Told the share done (0..1) and what is going on, possibly from several threads.
+pub type Progress<'a> = dyn Fn(f64, &str) + Sync + 'a;
+
+/// What a calibration file was made from.
+struct Inputs;
+
+impl Inputs {
+    /// The rig's file and the sessions' manifests, which hold the hashes of their frames.
+    fn of(rig: &Path, sessions: &[Session]) -> Result<Vec<Input>, FileError> {
+        let mut inputs =
+            vec![Input { name: rig.display().to_string(), sha256: sha256_of_file(rig)? }];
+        for session in sessions {
+            let sha256 = sha256_of_file(&session.manifest_path())?;
+            inputs.push(Input { name: session.name.clone(), sha256 });
+        }
+        Ok(inputs)
+    }
+}

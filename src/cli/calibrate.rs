@@ -1,0 +1,81 @@
+//! `weavelight calibrate`
+
+use super::output::{Failure, Output};
+use super::progress::Progress;
+use crate::calibrate::{self, CameraOptions};
+use clap::Subcommand;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Measure the instrument from pictures of targets
+///
+/// Three commands add to one calibration folder: `camera` from pictures of a chessboard, `color` from a grey chart, `lights`
+/// from white sheets. `status` says what there is and what to photograph next, `check` solves white sheets that the fit has
+/// not seen. Whatever fails, the old calibration stands.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  weavelight calibrate camera --rig rig.toml board --out calibration\n  \
+    weavelight calibrate color --rig rig.toml grey --out calibration\n  \
+    weavelight calibrate lights --rig rig.toml white-flat white-raised white-tilt-* --out calibration"
+)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Lens, sensor and the table's pose from pictures of a chessboard
+    #[command(
+        after_help = "Example:\n  weavelight calibrate camera --rig rig.toml board --out calibration"
+    )]
+    Camera {
+        /// The rig's description
+        #[arg(long, value_name = "rig.toml")]
+        rig: PathBuf,
+        /// Board capture sessions
+        #[arg(value_name = "BOARD_SESSION", required = true)]
+        sessions: Vec<PathBuf>,
+        /// Calibration folder to add to
+        #[arg(long, value_name = "CALIB")]
+        out: PathBuf,
+    },
+}
+
+pub(super) fn run(args: &Args) -> Result<Output, Failure> {
+    let bar = Progress::new();
+    let progress = |share: f64, what: &str| bar.set(share, what);
+    match &args.what {
+        What::Camera { rig, sessions, out } => {
+            let options =
+                CameraOptions { rig: rig.clone(), sessions: sessions.clone(), out: out.clone() };
+            let report = calibrate::camera(&options, &progress).map_err(Failure::work)?;
+            Ok(output(camera_text(&report), &report, &report.warnings))
+        }
+    }
+}
+
+fn output(text: String, report: &impl Serialize, warnings: &[String]) -> Output {
+    let json = serde_json::to_value(report).unwrap_or_default();
+    Output { text, json, warnings: warnings.to_vec(), status: 0 }
+}
+
+fn camera_text(report: &calibrate::CameraReport) -> String {
+    let kept = report.boards.iter().filter(|board| board.dropped.is_none()).count();
+    let names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
+    let values = report.intrinsics_px.iter().chain(&report.distortion);
+    let mut text = format!(
+        "{kept} of {} boards, reprojection error {:.3} px, camera {:.1} mm over the table\n",
+        report.boards.len(),
+        report.rms_reprojection_px,
+        report.height_mm
+    );
+    for ((name, value), sigma) in names.iter().zip(values).zip(report.sigma) {
+        let _ = writeln!(text, "{name} {value:12.5} +- {sigma:.5}");
+    }
+    for board in report.boards.iter().filter(|board| board.dropped.is_none()) {
+        let _ = writeln!(text, "{}: {:.3} px", board.file, board.rms_px.unwrap_or(f64::NAN));
+    }
+    text
+}
