@@ -7,9 +7,13 @@ mod boards;
 mod camera;
 mod error;
 mod frames;
+mod lights;
+mod moved;
+mod sheet;
 
 pub use camera::{BoardReport, CameraOptions, CameraReport, camera};
 pub use error::CalibrateError;
+pub use lights::{LightReport, LightsOptions, LightsReport, SheetReport, lights};
 
 use crate::files::{FileError, Input, sha256_of_file};
 use crate::session::Session;

@@ -2,7 +2,7 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
-use crate::calibrate::{self, CameraOptions};
+use crate::calibrate::{self, CameraOptions, LightsOptions};
 use clap::Subcommand;
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,6 +41,24 @@ enum What {
         #[arg(long, value_name = "CALIB")]
         out: PathBuf,
     },
+    /// Every LED's position, beam and strength from white sheets
+    ///
+    /// One flat sheet gives strengths and gain maps and keeps the ruler's positions; sheets flat, raised by 100 mm and tilted
+    /// by 20 degrees in four directions measure the positions too.
+    #[command(
+        after_help = "Example:\n  weavelight calibrate lights --rig rig.toml white-flat white-raised white-tilt-* --out calibration"
+    )]
+    Lights {
+        /// The rig's description
+        #[arg(long, value_name = "rig.toml")]
+        rig: PathBuf,
+        /// White capture sessions
+        #[arg(value_name = "WHITE_SESSION", required = true)]
+        sessions: Vec<PathBuf>,
+        /// Calibration folder to add to; needs its camera.toml
+        #[arg(long, value_name = "CALIB")]
+        out: PathBuf,
+    },
 }
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
@@ -52,6 +70,12 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
                 CameraOptions { rig: rig.clone(), sessions: sessions.clone(), out: out.clone() };
             let report = calibrate::camera(&options, &progress).map_err(Failure::work)?;
             Ok(output(camera_text(&report), &report, &report.warnings))
+        }
+        What::Lights { rig, sessions, out } => {
+            let options =
+                LightsOptions { rig: rig.clone(), sessions: sessions.clone(), out: out.clone() };
+            let report = calibrate::lights(&options, &progress).map_err(Failure::work)?;
+            Ok(output(lights_text(&report), &report, &report.warnings))
         }
     }
 }
@@ -76,6 +100,30 @@ fn camera_text(report: &calibrate::CameraReport) -> String {
     }
     for board in report.boards.iter().filter(|board| board.dropped.is_none()) {
         let _ = writeln!(text, "{}: {:.3} px", board.file, board.rms_px.unwrap_or(f64::NAN));
+    }
+    text
+}
+
+fn lights_text(report: &calibrate::LightsReport) -> String {
+    let mut text = format!(
+        "{} lights from {} ({} iterations, {:.1} s); residual {:.3} %, slow errors {:.3} %\n",
+        report.lights.len(),
+        report.method,
+        report.iterations,
+        report.fit_seconds,
+        100.0 * report.residual_rms,
+        100.0 * report.slow_error_rms
+    );
+    for (i, light) in report.lights.iter().enumerate() {
+        let _ = match (light.position_mm, light.position_sigma_mm) {
+            (Some([x, y, z]), Some(sigma)) => writeln!(
+                text,
+                "light {i}: [{x:.2}, {y:.2}, {z:.2}] mm +- {sigma:.2}{}, {:.1} mm from the rig file's",
+                if light.position_claimed { "" } else { " (the rig file's, not measured)" },
+                light.from_rig_mm.unwrap_or(f64::NAN)
+            ),
+            _ => writeln!(text, "light {i}: directional"),
+        };
     }
     text
 }

@@ -8,6 +8,7 @@ mod joint;
 mod observation;
 mod system;
 mod uncertainty;
+mod wiring;
 
 pub use emission::{Emitter, Place};
 pub use fit::{Error, Fit, FittedLight, Settings, fit};
@@ -16,6 +17,7 @@ pub use joint::Prior;
 #[cfg(test)]
 use joint::median;
 pub use observation::{Cell, PoseSigma, Sample, Sheet};
+pub use wiring::{Mismatch, mismatches};
 
 #[cfg(test)]
 mod bench_scene;

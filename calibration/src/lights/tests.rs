@@ -194,3 +194,17 @@ fn a_light_without_cells_is_named() {
     let error = fit(&sheets, &bench.priors(&leds), &Settings::default()).unwrap_err();
     assert_eq!(error, Error::NoCells { light: 7 });
 }
+
+#[test]
+fn swapped_wires_are_named_and_a_bad_ruler_is_not_mistaken_for_them() {
+    let bench = Bench { ruler_error_mm: 30.0, grid: [12, 8], ..Bench::default() };
+    let leds = bench.leds();
+    let mut sheets = bench.sheets(&leds, &poses()[..1]);
+    assert_eq!(mismatches(&sheets, &bench.priors(&leds)), []);
+    sheets[0].samples.chunks_mut(leds.len()).for_each(|cell| cell.swap(3, 8));
+    let found = mismatches(&sheets, &bench.priors(&leds));
+    assert_eq!(
+        found,
+        [Mismatch { light: 3, shines_like: 8 }, Mismatch { light: 8, shines_like: 3 }]
+    );
+}
