@@ -2,6 +2,7 @@
 # make test    every test
 # make build   the release executables with every feature, in target/release
 # make firmware the light board's firmware, and the simulated board that tests run it in
+# make soak    light board and host for fifteen minutes over a bad wire
 # make bench   run time against error and against touching the bytes once
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
@@ -43,3 +44,8 @@ build: packages-all
 
 bench: packages-all
 	cargo bench --locked --all-features
+
+# Fifteen minutes with the real firmware over a bad wire; make soak SOAK_S=60 for a short one.
+SOAK_S ?= 900
+soak: packages-all firmware
+	WEAVELIGHT_SOAK_S=$(SOAK_S) cargo test --locked --release --test board -- --ignored --nocapture fifteen_minutes

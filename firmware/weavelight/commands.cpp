@@ -39,7 +39,7 @@ void guard_and_tell() {
 }
 
 static void report_outputs(Reply &reply) {
-    reply.text("OK").hex(pins_read(), 5).number(millis());
+    reply.text("OK").hex(pins_read(), 5).number(millis(), 10);
 }
 
 static void settle() {

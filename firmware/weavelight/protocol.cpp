@@ -114,12 +114,16 @@ Reply &Reply::text(const char *text) {
 }
 
 Reply &Reply::number(uint32_t value) {
-    char digits[10];
+    return number(value, 1);
+}
+
+Reply &Reply::number(uint32_t value, uint8_t digits) {
+    char text[10];
     uint8_t count = 0;
-    do digits[count++] = '0' + value % 10;
-    while (value /= 10);
+    do text[count++] = '0' + value % 10;
+    while ((value /= 10) || count < digits);
     space();
-    while (count) put(digits[--count]);
+    while (count) put(text[--count]);
     return *this;
 }
 

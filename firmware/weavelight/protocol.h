@@ -59,6 +59,7 @@ class Reply {
 public:
     Reply &text(const char *text);
     Reply &number(uint32_t value);
+    Reply &number(uint32_t value, uint8_t digits);
     Reply &hex(uint32_t value, uint8_t digits);
     // Adds checksum and line end.
     const char *finish();

@@ -88,6 +88,16 @@ pub(crate) fn sealed(line: &str) -> String {
     }
 }
 
+/// With ten digits in the clock's place, where the line may have fewer, or `<ms>` for `now`.
+pub(crate) fn with_clock(line: &str, now: Duration) -> String {
+    let line = line.replace("<ms>", &now.as_millis().to_string());
+    let Some((text, checksum)) = line.split_once('*') else { return line };
+    match text.split(' ').collect::<Vec<_>>()[..] {
+        [seq, "OK", pins, ms] => format!("{seq} OK {pins} {ms:0>10}*{checksum}"),
+        _ => line,
+    }
+}
+
 /// What an event tells the program, in words.
 pub(crate) fn told(event: &Event) -> String {
     match event {
@@ -110,6 +120,7 @@ pub(crate) fn told(event: &Event) -> String {
                 format!("changed: {expected:05X} to {read:05X}")
             }
             Interruption::Silent => "silent".to_owned(),
+            Interruption::Unplugged => "unplugged".to_owned(),
         },
     }
 }
@@ -187,7 +198,7 @@ impl Host {
             Step::ToBoard(line) => assert_eq!(self.next_line().as_ref(), Some(line)),
             Step::FromBoard(line) => {
                 self.now += Duration::from_millis(4);
-                let line = sealed(&line.replace("<ms>", &self.now.as_millis().to_string()));
+                let line = sealed(&with_clock(line, self.now));
                 self.board.receive(format!("{line}\n").as_bytes(), self.now);
                 self.collect();
             }

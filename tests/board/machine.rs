@@ -56,6 +56,8 @@ fn a_damaged_answer_is_asked_for_again_at_once() {
     check("ask light 3 | < 1 OK 00008 17", &[]);
     check("ask light 3 | < 1 OK 00008*HH", &[]);
     check("ask light 3 | < 1 OK 0000G 17*HH", &[]);
+    check("ask light 3 | < 1 OK 0008 17*HH", &[]);
+    check("ask light 3 | < 1 OK 00008 12345678901*HH", &[]);
     check("ask light 3 | < 1 YES 00008 17*HH", &[]);
 }
 
@@ -127,7 +129,7 @@ fn board_that_lit_three() -> LightBoard {
     let mut board = LightBoard::new(0);
     board.ask(Request::Light { light: 3, level: None }, Duration::ZERO).unwrap();
     board.take_output();
-    board.receive(seal("1 OK 00008 17").as_bytes(), Duration::from_millis(4));
+    board.receive(seal("1 OK 00008 0000000017").as_bytes(), Duration::from_millis(4));
     board.next_event();
     board
 }
@@ -145,7 +147,7 @@ fn keep_alives_come_in_time() {
         let seq = sent.split(' ').next().unwrap().to_owned();
         assert!(sent.contains("PING"), "{sent}");
         board_ms += 100;
-        board.receive(seal(&format!("{seq} OK 00008 {board_ms}")).as_bytes(), now);
+        board.receive(seal(&format!("{seq} OK 00008 {board_ms:010}")).as_bytes(), now);
         last = now;
     }
     assert_eq!(board.next_event(), None);
@@ -158,9 +160,9 @@ fn a_keep_alive_gives_way_to_a_request() {
     let ask = |board: &mut LightBoard| board.ask(Request::Off, Duration::from_millis(101));
     assert!(ask(&mut board).is_ok());
     assert!(ask(&mut board).is_err());
-    board.receive(seal("2 OK 00008 113").as_bytes(), Duration::from_millis(102));
+    board.receive(seal("2 OK 00008 0000000113").as_bytes(), Duration::from_millis(102));
     assert_eq!(board.next_event(), None);
-    board.receive(seal("3 OK 00000 115").as_bytes(), Duration::from_millis(104));
+    board.receive(seal("3 OK 00000 0000000115").as_bytes(), Duration::from_millis(104));
     assert!(matches!(board.next_event(), Some(Event::Done { request: Request::Off, .. })));
 }
 
@@ -200,7 +202,7 @@ proptest! {
     fn an_answer_may_come_in_pieces_and_after_noise(cut in 1usize..20, noise in "[^\n]{0,300}\n") {
         let mut board = LightBoard::new(0);
         board.ask(Request::Light { light: 3, level: None }, Duration::ZERO).unwrap();
-        for piece in (noise + &seal("1 OK 00008 17")).as_bytes().chunks(cut) {
+        for piece in (noise + &seal("1 OK 00008 0000000017")).as_bytes().chunks(cut) {
             board.receive(piece, Duration::ZERO);
         }
         let done = matches!(board.next_event(), Some(Event::Done { .. }));

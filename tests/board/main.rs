@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 #![allow(clippy::print_stdout, reason = "tests say what was not run, and what was measured")]
-#![allow(dead_code, reason = "the tests of the link come next")]
 
 mod exchange;
 mod firmware;
+mod link;
 mod machine;
 mod protocol;
 mod simboard;
+mod soak;

@@ -8,7 +8,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-const BOOTLOADER: &str =
+/// Debian's image of the Uno's bootloader.
+pub(crate) const BOOTLOADER: &str =
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot_atmega328.hex";
 
 fn firmware_folder() -> PathBuf {
@@ -89,6 +90,15 @@ impl SimBoard {
     /// Board's time in microseconds, and its outputs.
     pub(crate) fn pins(&mut self) -> (u64, u32) {
         parse_edge(&self.command("pins"))
+    }
+
+    /// Waits until the outputs are `pins`.
+    pub(crate) fn wait_for_pins(&mut self, pins: u32) {
+        let start = Instant::now();
+        while self.pins().1 != pins {
+            assert!(start.elapsed() < Duration::from_secs(30), "the outputs never were {pins:05X}");
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// Every change of the outputs since the last call.

@@ -102,6 +102,8 @@ pub enum Interruption {
     },
     /// Keep-alives get no answer.
     Silent,
+    /// The port has gone away, or is closed because nobody answers behind it (told by the link, not by the protocol).
+    Unplugged,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,11 +1,20 @@
 //! The light board: its protocol, and the serial link around it.
 //!
-//! [`wire`] is the lines, [`LightBoard`] the host's end of the protocol as a state machine without input and output.
-//! `firmware/PROTOCOL.md` describes the protocol, `firmware/weavelight` is the other end.
+//! [`wire`] is the lines, [`LightBoard`] the host's end of the protocol as a state machine without input and output, [`Board`]
+//! the board at a serial port. `firmware/PROTOCOL.md` describes the protocol, `firmware/weavelight` is the other end.
 
+mod connection;
+mod diagnose;
+mod discovery;
+mod error;
+mod link;
 mod machine;
 pub mod wire;
 
+pub use diagnose::{PortFinding, diagnose};
+pub use discovery::{PortChoice, candidates};
+pub use error::BoardError;
+pub use link::{Board, Shown, identify_at};
 pub use machine::{
     BUDGET, Busy, Event, Failure, IDENTIFY_BUDGET, IDENTIFY_RETRY, Interruption, KEEP_ALIVE,
     LightBoard, RETRY, RETRY_AT_ONCE,

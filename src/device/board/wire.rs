@@ -229,10 +229,11 @@ fn parse_answer(words: &[&str]) -> Option<Answer> {
             Some(Answer::Refused(known.0))
         }
         ["OK", value] => Some(Answer::Value(value.parse().ok()?)),
-        ["OK", pins, board_ms] => Some(Answer::Outputs(Outputs {
-            pins: u32::from_str_radix(pins, 16).ok()?,
-            board_ms: board_ms.parse().ok()?,
-        })),
+        // A lost digit must not make another number: see PROTOCOL.md.
+        ["OK", pins, board_ms] if pins.len() == 5 && board_ms.len() == 10 => {
+            let pins = u32::from_str_radix(pins, 16).ok()?;
+            Some(Answer::Outputs(Outputs { pins, board_ms: board_ms.parse().ok()? }))
+        }
         ["OK", BOARD_NAME, firmware, protocol, ref rest @ ..] => {
             Some(Answer::Identity(parse_identity(firmware, protocol.parse().ok()?, rest)))
         }
