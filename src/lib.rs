@@ -16,6 +16,7 @@
 pub mod calibrate;
 pub mod cli;
 pub mod compare;
+pub mod demo;
 pub mod device;
 pub mod doctor;
 pub mod files;

@@ -4,11 +4,13 @@
 
 mod calibrate;
 mod compare;
+mod demo;
 mod doctor;
 mod gui;
 mod import;
 mod output;
 mod progress;
+mod simulate;
 mod solve;
 #[cfg(test)]
 mod tests;
@@ -30,6 +32,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::Args),
+    Simulate(simulate::Args),
     Solve(solve::Args),
     Import(import::Args),
     Calibrate(calibrate::Args),
@@ -41,6 +45,8 @@ enum Command {
 impl Command {
     fn run(&self) -> Result<Output, Failure> {
         match self {
+            Command::Demo(args) => demo::run(args),
+            Command::Simulate(args) => simulate::run(args),
             Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
             Command::Calibrate(args) => calibrate::run(args),

@@ -162,7 +162,11 @@ fn check_size(
     Err(CompareError::Size { a: a.to_owned(), a_size, b: b.to_owned(), b_size })
 }
 
-fn read_map(path: &Path) -> Result<Image<[f32; 3]>, CompareError> {
+/// Reads a map: EXR with channels R, G, B, or Y as grey.
+///
+/// # Errors
+/// Where the file cannot be read or has other channels.
+pub fn read_map(path: &Path) -> Result<Image<[f32; 3]>, CompareError> {
     let exr = read_exr(path)?;
     let [r, g, b] = channels(&exr).ok_or_else(|| CompareError::Channels(path.to_owned()))?;
     let data = r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect();
