@@ -184,7 +184,7 @@ impl Studio<'_> {
         let shots = self.shots(plan, &pictures);
         let (frames, seen) =
             shoot_with_truth(&fabric, stage, &self.instrument.sensor, &shots, progress);
-        truth::write(&self.folder.join("truth"), self.instrument.size_px(), &seen)?;
+        truth::write(&self.folder.join("truth"), self.instrument.size_px(), seen)?;
         let mut session = self.session(plan, Kind::Swatch);
         session.plane = level_plane(fabric.thickness_mm);
         self.write(session, plan, frames, pictures, exposure)

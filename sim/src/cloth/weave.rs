@@ -81,9 +81,13 @@ impl Woven {
     #[inline]
     fn crown(&self, family: u8, index: i64, across: f64, along: f64) -> Option<Crown> {
         let yarn = self.yarn(family);
+        let off_middle = across - (index as f64 + 0.5) * yarn.spacing_mm;
+        if off_middle.abs() >= yarn.half_width_mm * (1.0 + yarn.slub) + yarn.wander_mm {
+            return None; // however it wanders and swells
+        }
         let [side, width] = yarn.course(self.key(family, index), along);
         let half_width = yarn.half_width_mm * width.0;
-        let u = (across - (index as f64 + 0.5) * yarn.spacing_mm - side.0) / half_width;
+        let u = (off_middle - side.0) / half_width;
         if u.abs() >= 1.0 {
             return None;
         }

@@ -238,8 +238,8 @@ pub fn auto_exposure(
 /// Small tiles spread over the frame: about one photosite in fifty of a large frame, all of a small one's.
 fn sample_tiles(stage: &Stage) -> Vec<Tile> {
     let (width, height) = (stage.view.camera.width_px, stage.view.camera.height_px);
-    let side = 8;
-    let stride = |length: usize| (length / 75).max(side);
+    let side = 16;
+    let stride = |length: usize| (length / 36).max(side);
     let starts =
         |length: usize| (0..length).step_by(stride(length)).map(move |at| (at & !1, length));
     let tiles = starts(height).flat_map(|(y, height)| {
