@@ -61,11 +61,7 @@ impl Command {
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => {
-            // Help and version are no failures and go to standard output; a closed pipe is nobody's concern.
-            let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { output::CALL_WRONG } else { 0 });
-        }
+        Err(error) => return output::refuse(&error),
     };
     output::finish(cli.command.run(), cli.json)
 }

@@ -59,6 +59,36 @@ pub(super) fn finish(result: Result<Output, Failure>, json: bool) -> ExitCode {
     }
 }
 
+/// Says what is wrong with a call, in two lines, or gives the help that was asked for.
+pub(super) fn refuse(error: &clap::Error) -> ExitCode {
+    use clap::error::ErrorKind;
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            to_stdout(&error.render().to_string());
+            ExitCode::SUCCESS
+        }
+        ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            to_stderr(&error.render().to_string());
+            ExitCode::from(CALL_WRONG)
+        }
+        _ => {
+            to_stderr(&in_two_lines(&error.render().to_string()));
+            ExitCode::from(CALL_WRONG)
+        }
+    }
+}
+
+/// The first paragraph of a message, which says what is wrong, and its usage.
+fn in_two_lines(message: &str) -> String {
+    let paragraph: Vec<&str> =
+        message.lines().take_while(|line| !line.is_empty()).map(str::trim).collect();
+    let usage = message
+        .lines()
+        .find(|line| line.starts_with("Usage:"))
+        .unwrap_or("Try `weavelight --help`");
+    format!("{}\n{usage}; see --help", paragraph.join(" "))
+}
+
 /// A reader that stopped listening (`weavelight ... | head`) is no failure of the work, so errors are let go.
 fn to_stdout(text: &str) {
     let text = text.trim_end();

@@ -4,8 +4,8 @@ use super::output::{Failure, Output};
 use super::progress::Progress;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
-use crate::solution::Report;
-use crate::solve::{self, Grid, NormalY, Options, Shown, Stage};
+use crate::solution::{REPORT_HTML, Report};
+use crate::solve::{self, Grid, NormalY, Options, Shown};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -88,39 +88,32 @@ impl Args {
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let progress = Progress::new();
+    let tell = |state: solve::Progress| progress.set(state.share(), state.stage.what());
     let page = |shown: &Shown| page_of_solve(shown, None);
     let solved =
-        solve::run_with_page(&args.options(), &|state| show(&progress, state), Some(&page))
-            .map_err(Failure::work)?;
+        solve::run_with_page(&args.options(), &tell, Some(&page)).map_err(Failure::work)?;
     drop(progress);
     let report = solved.report;
     let up_to_date = if solved.up_to_date { "up to date, " } else { "" };
     Ok(Output {
-        text: format!("{}: {up_to_date}{}", args.out.display(), text(&report)),
+        text: format!(
+            "{}: {up_to_date}{}\n{}  to look at",
+            args.out.display(),
+            text(&report),
+            args.out.join(REPORT_HTML).display()
+        ),
         json: serde_json::to_value(&report).map_err(Failure::work)?,
         warnings: report.warnings,
         status: 0,
     })
 }
 
-/// Shows a solve's stage on the bar; the stages' lengths are about those of a full-size run.
-pub(super) fn show(progress: &Progress, state: solve::Progress) {
-    let (start, length, what) = match state.stage {
-        Stage::Read => (0.0, 0.3, "reading frames"),
-        Stage::Solve => (0.3, 0.4, "solving"),
-        Stage::Colour => (0.7, 0.1, "finding colours"),
-        Stage::Write => (0.8, 0.15, "writing maps"),
-        Stage::Page => (0.95, 0.05, "writing the page"),
-    };
-    let share = state.done as f64 / state.total.max(1) as f64;
-    progress.set(start + length * share, what);
-}
-
 fn text(report: &Report) -> String {
     let percent = |count: u64| 100.0 * count as f64 / report.pixels.max(1) as f64;
     let scale =
         report.mm_per_px.map_or_else(String::new, |scale| format!(", {scale:.4} mm per pixel"));
-    let seconds: f64 = report.seconds.values().sum();
+    let seconds =
+        report.seconds.get("total").copied().unwrap_or_else(|| report.seconds.values().sum());
     format!(
         "{:.1} % of {} photosites solved from {} lights{scale}\n\
          robust path {:.2} %, clipped samples at {:.2} %, residual {:.5} of white, albedo in {}, {seconds:.1} s",

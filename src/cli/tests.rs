@@ -47,6 +47,20 @@ fn calls_are_understood_or_refused() {
     check("weavelight solve s --calibration c --out m --method best", false);
     check("weavelight solve s --out m", false);
     check("weavelight solve s --calibration c --out m --threads 0", false);
+    check("weavelight demo", true);
+    check("weavelight demo --out d --size 64x48", true);
+    check("weavelight demo --size big", false);
+    check(
+        "weavelight simulate --out d --preset knit --size 64x48 --seed 3 --only swatch,white-flat",
+        true,
+    );
+    check(
+        "weavelight simulate --out d --swapped 3 7 --drift -0.1 --swatch-mm 90x60 --noiseless",
+        true,
+    );
+    check("weavelight simulate --out d --preset felt", false);
+    check("weavelight simulate --out d --only everything", false);
+    check("weavelight simulate --preset knit", false);
     check("weavelight doctor", true);
     check("weavelight gui", true);
     check("weavelight fly", false);

@@ -147,7 +147,11 @@ fn read_lines(path: &Path, columns: usize) -> Result<Vec<Line>, FileError> {
 
 fn parse_line(path: &Path, number: usize, line: &str, columns: usize) -> Result<Line, FileError> {
     let wrong = || {
-        invalid(path, number, &format!("\"{}\" is not {columns} finite numbers", shortened(line)))
+        invalid(
+            path,
+            number,
+            &format!("\"{}\" is not {columns} finite numbers; correct this line", shortened(line)),
+        )
     };
     let words: Vec<&str> = words(line).collect();
     if words.len() < columns {
