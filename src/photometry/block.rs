@@ -41,7 +41,9 @@ pub(crate) struct Block {
 pub(crate) struct Sample {
     /// y, zero where unusable.
     pub(crate) y: Lanes,
-    /// 1 where y is usable, else 0.
+    /// 1 where y is finite, else 0.
+    pub(crate) finite: Lanes,
+    /// 1 where y takes part, else 0: finite and not withdrawn by the subset test.
     pub(crate) usable: Lanes,
     /// Light vector in units of [`Pieces::unit`].
     pub(crate) light: [Lanes; 3],
@@ -55,6 +57,7 @@ impl Block {
     pub(crate) fn reset(&mut self, input: &RowInput) {
         let blank = Sample {
             y: ZERO,
+            finite: ZERO,
             usable: ZERO,
             light: [ZERO; 3],
             weight: ZERO,
@@ -139,9 +142,28 @@ impl Block {
         offset
     }
 
+    /// Leaves only samples that had a weight and are not in these sets (bit i for light i), for this solve and those to come.
+    pub(crate) fn keep_others(&mut self, dropped: &[u64; LANES]) {
+        for (i, sample) in self.sample.iter_mut().enumerate() {
+            for k in 0..LANES {
+                if dropped[k] >> i & 1 == 1 {
+                    sample.weight[k] = 0.0;
+                }
+                sample.usable[k] = if sample.weight[k] > 0.0 { 1.0 } else { 0.0 };
+            }
+        }
+    }
+
+    /// Lets every finite sample take part again.
+    pub(crate) fn readmit(&mut self) {
+        for sample in &mut self.sample {
+            sample.usable = sample.finite;
+        }
+    }
+
     /// Samples that lane `k` can use.
     pub(crate) fn usable_samples(&self, k: usize) -> usize {
-        self.sample.iter().filter(|sample| sample.usable[k] > 0.0).count()
+        self.sample.iter().filter(|sample| sample.finite[k] > 0.0).count()
     }
 
     /// Bit i is set if light i had a weight in the latest solve of lane `k`.
@@ -197,8 +219,9 @@ impl Sample {
         for k in 0..LANES {
             let usable = y[k].abs() < f32::INFINITY;
             self.y[k] = if usable { y[k] } else { 0.0 };
-            self.usable[k] = if usable { 1.0 } else { 0.0 };
+            self.finite[k] = if usable { 1.0 } else { 0.0 };
         }
+        self.usable = self.finite;
     }
 }
 

@@ -45,3 +45,44 @@ pub(crate) const COPLANAR_CONDITION: f64 = 1e5;
 /// Least standard deviation of a sample relative to the photosite's brightest: no light field is known better, and it
 /// keeps weights finite where the noise model says zero.
 pub(crate) const RELATIVE_FLOOR: f64 = 1e-5;
+
+/// What dropping a sample must save of the chi-square to pay: between 3 and 4 standard deviations.
+pub(crate) const DROP_PENALTY: f64 = 12.0;
+
+/// Most samples that the exact search drops, and fewest that it leaves.
+pub(crate) const MOST_DROPPED: usize = 4;
+pub(crate) const FEWEST_KEPT: usize = 4;
+
+/// Up to this many lights every subset is tried (1471 of them); beyond, thresholds are tightened step by step.
+pub(crate) const MOST_LIGHTS_EXACT: usize = 14;
+
+/// A subset must leave this much of the determinant of sum w l l^T, or the rest would nearly lie in a plane. So little,
+/// because a dim sample weighs a thousand times a bright one, and up to four may go.
+pub(crate) const LEAST_DETERMINANT: f64 = 1e-10;
+
+/// The first search sets aside what is darker than this share of the photosite's median: shadow, cast or attached.
+pub(crate) const DARK_SHARE: f64 = 0.1;
+
+/// Fewest samples that the first search may start from.
+pub(crate) const SEARCH_SAMPLES: usize = 5;
+
+/// Chi-square that a good fit stays below with probability 0.999, by degrees of freedom (lights kept minus 3). No degree
+/// of freedom, no test.
+pub(crate) fn chi_square_limit(freedom: usize) -> f64 {
+    match freedom {
+        0 => f64::INFINITY,
+        _ => CHI_SQUARE_999[(freedom - 1).min(CHI_SQUARE_999.len() - 1)],
+    }
+}
+
+#[rustfmt::skip]
+const CHI_SQUARE_999: [f64; 61] = [
+    10.8276, 13.8155, 16.2662, 18.4668, 20.5150, 22.4577, 24.3219, 26.1245,
+    27.8772, 29.5883, 31.2641, 32.9095, 34.5282, 36.1233, 37.6973, 39.2524,
+    40.7902, 42.3124, 43.8202, 45.3147, 46.7970, 48.2679, 49.7282, 51.1786,
+    52.6197, 54.0520, 55.4760, 56.8923, 58.3012, 59.7031, 61.0983, 62.4872,
+    63.8701, 65.2472, 66.6188, 67.9852, 69.3465, 70.7029, 72.0547, 73.4020,
+    74.7449, 76.0838, 77.4186, 78.7495, 80.0767, 81.4003, 82.7204, 84.0371,
+    85.3506, 86.6608, 87.9680, 89.2722, 90.5734, 91.8718, 93.1675, 94.4605,
+    95.7510, 97.0388, 98.3242, 99.6072, 100.8879,
+];

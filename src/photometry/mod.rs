@@ -18,9 +18,13 @@ mod normal_equations;
 mod normalise;
 mod pieces;
 mod reference;
+mod reference_robust;
+mod robust;
 mod row;
 mod solve_row;
+mod subset;
 mod surface;
+mod tighten;
 mod weighted;
 
 #[cfg(test)]

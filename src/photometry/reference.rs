@@ -93,9 +93,17 @@ pub fn solve_pixel(samples: &Samples, method: Method) -> Pixel {
             let lengthening = 0.0;
             samples.describe(&start, samples.sandwich(&start), lengthening, Outcome::Fitted)
         }
-        Method::Weighted | Method::Robust | Method::Auto => {
-            let solution = samples.weighted(&usable, start);
-            samples.describe(&solution, solution.inverse, MOST_LENGTHENING, Outcome::Fitted)
+        Method::Weighted => {
+            samples.describe_weighted(&samples.weighted(&usable, start), Outcome::Fitted)
+        }
+        Method::Robust => samples.solve_robustly(&usable, &samples.weighted(&usable, start)),
+        Method::Auto => {
+            let weighted = samples.weighted(&usable, start);
+            if samples.fits(&weighted) && !samples.overlooks(&weighted, &usable) {
+                samples.describe_weighted(&weighted, Outcome::Fitted)
+            } else {
+                samples.solve_robustly(&usable, &weighted)
+            }
         }
     }
 }
@@ -143,9 +151,35 @@ impl Samples<'_> {
         solution
     }
 
+    /// The subset test; where none of its solves succeeds, the weighted solution stands.
+    fn solve_robustly(&self, usable: &[bool; MAX_LIGHTS], weighted: &Solution) -> Pixel {
+        match self.robust(usable) {
+            Some((solution, outcome)) => self.describe_weighted(&solution, outcome),
+            None => self.describe_weighted(weighted, Outcome::Other),
+        }
+    }
+
+    /// Whether a light that counts as behind the surface is clearly seen.
+    fn overlooks(&self, solution: &Solution, usable: &[bool; MAX_LIGHTS]) -> bool {
+        let least = START_LEVEL * self.level();
+        self.y
+            .iter()
+            .enumerate()
+            .any(|(i, &y)| usable[i] && solution.weights[i] == 0.0 && y > least)
+    }
+
+    fn describe_weighted(&self, solution: &Solution, outcome: Outcome) -> Pixel {
+        self.describe(solution, solution.inverse, MOST_LENGTHENING, outcome)
+    }
+
+    /// Least variance that counts.
+    pub(crate) fn least_variance(&self) -> f64 {
+        (RELATIVE_FLOOR * self.level()).powi(2).max(f64::MIN_POSITIVE)
+    }
+
     /// Samples for the plain start: those near the photosite's own level, or all where these are too few.
     fn bright(&self, usable: &[bool; MAX_LIGHTS]) -> [bool; MAX_LIGHTS] {
-        let least = START_LEVEL * self.level(usable);
+        let least = START_LEVEL * self.level();
         let mut bright = *usable;
         for (bright, &y) in bright.iter_mut().zip(self.y) {
             *bright &= y > least;
@@ -160,8 +194,8 @@ impl Samples<'_> {
         usable: &[bool; MAX_LIGHTS],
         lit_only: bool,
     ) -> [f64; MAX_LIGHTS] {
-        let level = self.level(usable);
-        let least = (RELATIVE_FLOOR * level).powi(2).max(f64::MIN_POSITIVE);
+        let level = self.level();
+        let least = self.least_variance();
         let mut weights = [0.0; MAX_LIGHTS];
         for (i, l) in self.lights.iter().enumerate().filter(|&(i, _)| usable[i]) {
             let predicted = g.dot(l);
@@ -181,10 +215,9 @@ impl Samples<'_> {
         predicted > 0.0 || (arrives && !behind)
     }
 
-    /// The brightest usable sample.
-    fn level(&self, usable: &[bool; MAX_LIGHTS]) -> f64 {
-        let values = self.y.iter().zip(usable).filter(|(_, usable)| **usable);
-        values.fold(0.0, |level, (y, _)| level.max(y.abs()))
+    /// The brightest sample.
+    fn level(&self) -> f64 {
+        self.y.iter().filter(|y| y.is_finite()).fold(0.0, |level, y| level.max(y.abs()))
     }
 
     fn describe(

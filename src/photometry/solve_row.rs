@@ -9,6 +9,7 @@ use super::least_squares::{solve_complete, solve_masked};
 use super::method::Method;
 use super::pieces::Pieces;
 use super::reference::solve_column;
+use super::robust::RobustSolver;
 use super::row::{Outcome, RowError, RowInput, RowOutput, check_shapes};
 use super::weighted::solve_weighted;
 
@@ -17,6 +18,7 @@ use super::weighted::solve_weighted;
 pub struct RowSolver {
     pieces: Pieces,
     block: Block,
+    robust: RobustSolver,
     queues: Queues,
 }
 
@@ -25,6 +27,8 @@ pub struct RowSolver {
 struct Queues {
     /// Samples missing.
     masked: Vec<Place>,
+    /// Residual too large.
+    suspect: Vec<Place>,
     /// Beyond float32.
     deferred: Vec<usize>,
 }
@@ -50,6 +54,7 @@ impl RowSolver {
         self.pieces.cut(&input.field, output.outcome.len());
         self.block.reset(input);
         self.queues.masked.clear();
+        self.queues.suspect.clear();
         self.queues.deferred.clear();
         for index in 0..self.pieces.list.len() {
             let piece = self.pieces.list[index];
@@ -58,12 +63,17 @@ impl RowSolver {
                 Method::LeastSquares => {
                     self.neighbours(index, input, output, least_squares_of_block);
                 }
-                Method::Weighted | Method::Robust | Method::Auto => {
-                    self.neighbours(index, input, output, weighted_of_block);
+                Method::Weighted => self.neighbours(index, input, output, weighted_of_block),
+                Method::Auto => self.neighbours(index, input, output, weighted_or_suspect_of_block),
+                Method::Robust => {
+                    self.queues.suspect.extend(
+                        (piece.start..piece.end).map(|column| Place { column, piece: index }),
+                    );
                 }
             }
         }
         self.masked(input, output);
+        self.suspects(input, output);
         for &column in &self.queues.deferred {
             let pixel = solve_column(input, column, method);
             output.write(column, &pixel);
@@ -99,6 +109,23 @@ impl RowSolver {
         for places in self.queues.masked.chunks(LANES) {
             self.block.gather(input, &self.pieces, places);
             masked_of_block(&mut self.block, self.pieces.unit, output, &mut self.queues.deferred);
+        }
+    }
+}
+
+impl RowSolver {
+    /// The subset test for those that ask for it.
+    fn suspects(&mut self, input: &RowInput, output: &mut RowOutput) {
+        for places in self.queues.suspect.chunks(LANES) {
+            self.block.gather(input, &self.pieces, places);
+            let unit = self.pieces.unit;
+            robust_of_block(
+                &mut self.block,
+                &mut self.robust,
+                unit,
+                output,
+                &mut self.queues.deferred,
+            );
         }
     }
 }
@@ -158,10 +185,61 @@ fn weighted_of_block(
         return dark(block, output);
     }
     let solved = solve_weighted(block);
-    solved.surface.write(block, pieces.unit, output, |k, output| match block.usable_samples(k) {
-        0..3 => output.clear(block.column[k], Outcome::TooFewLights),
-        _ => queues.deferred.push(block.column[k]),
+    solved.surface.write(block, pieces.unit, output, |k, output| {
+        defer(block, k, output, &mut queues.deferred);
     });
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn weighted_or_suspect_of_block(
+    block: &mut Block,
+    pieces: &Pieces,
+    piece: usize,
+    columns: Range<usize>,
+    input: &RowInput,
+    output: &mut RowOutput,
+    queues: &mut Queues,
+) {
+    block.load(input, pieces, &pieces.list[piece], columns);
+    if block.is_dark() {
+        return dark(block, output);
+    }
+    let mut solved = solve_weighted(block);
+    let mut suspect = [false; LANES];
+    for k in 0..LANES {
+        suspect[k] = solved.surface.carried[k] && solved.is_suspect(k);
+        solved.surface.carried[k] &= !suspect[k];
+    }
+    solved.surface.write(block, pieces.unit, output, |k, output| {
+        if suspect[k] {
+            queues.suspect.push(Place { column: block.column[k], piece });
+        } else {
+            defer(block, k, output, &mut queues.deferred);
+        }
+    });
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn robust_of_block(
+    block: &mut Block,
+    robust: &mut RobustSolver,
+    unit: f64,
+    output: &mut RowOutput,
+    deferred: &mut Vec<usize>,
+) {
+    if block.is_dark() {
+        return dark(block, output);
+    }
+    let solved = robust.solve(block);
+    solved.surface.write(block, unit, output, |k, output| defer(block, k, output, deferred));
+}
+
+/// Sends a photosite to float64 unless it is clear without that nothing can be solved.
+fn defer(block: &Block, k: usize, output: &mut RowOutput, deferred: &mut Vec<usize>) {
+    match block.usable_samples(k) {
+        0..3 => output.clear(block.column[k], Outcome::TooFewLights),
+        _ => deferred.push(block.column[k]),
+    }
 }
 
 /// A block without light: nothing to solve, as over the table when a mask is set.

@@ -1,6 +1,6 @@
 //! What a block's solve found, and how it is written to the row.
 
-use super::block::{Block, LANES, Lanes, ZERO};
+use super::block::{Block, LANES, Lanes, Sample, ZERO};
 use super::reference::MOST_ERROR_DEG;
 use super::row::{Outcome, RowOutput};
 
@@ -14,6 +14,8 @@ pub(crate) struct Surface {
     pub(crate) count: Lanes,
     /// `false` where a photosite needs another path: samples missing, lights too badly conditioned for float32.
     pub(crate) carried: [bool; LANES],
+    /// What the subset test says of a solved photosite.
+    pub(crate) outcome: [Outcome; LANES],
     /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
     most_lengthening: f32,
 }
@@ -27,7 +29,22 @@ impl Surface {
     pub(crate) fn new(g: [Lanes; 3], most_lengthening: f64) -> Self {
         let carried = [true; LANES];
         let most_lengthening = most_lengthening as f32;
-        Self { g, tangent_variance: ZERO, squares: ZERO, count: ZERO, carried, most_lengthening }
+        let outcome = [Outcome::Fitted; LANES];
+        Self {
+            g,
+            tangent_variance: ZERO,
+            squares: ZERO,
+            count: ZERO,
+            carried,
+            outcome,
+            most_lengthening,
+        }
+    }
+
+    /// The signal that lane `k`'s solution predicts.
+    pub(crate) fn predicted(&self, sample: &Sample, k: usize) -> f32 {
+        let [lx, ly, lz] = &sample.light;
+        lx[k] * self.g[0][k] + ly[k] * self.g[1][k] + lz[k] * self.g[2][k]
     }
 
     /// Unit normal (0 where there is none), length of g in the block's units.
@@ -75,7 +92,7 @@ impl Surface {
                 output.albedo[column] = albedo[k];
                 output.expected_error_deg[column] = error_deg[k];
                 output.residual[column] = residual[k];
-                output.outcome[column] = Outcome::Fitted;
+                output.outcome[column] = self.outcome[k];
                 if output.kept.is_some() {
                     output.keep(column, block.kept(k));
                 }

@@ -1,7 +1,7 @@
 //! Weighted least squares of a block, with lights behind the surface left out.
 
 use super::block::{Block, LANES, ZERO};
-use super::method::{MOST_LENGTHENING, REWEIGHTINGS};
+use super::method::{MOST_LENGTHENING, REWEIGHTINGS, START_LEVEL, chi_square_limit};
 use super::normal_equations::{Sums, Weighting, accumulate, times};
 use super::surface::Surface;
 
@@ -9,13 +9,27 @@ use super::surface::Surface;
 const WEIGHTED_CONDITION_SQUARED: f32 = 1e4;
 
 /// A block's weighted solution and its chi-square.
-#[allow(dead_code, reason = "the subset test will read them")]
 pub(crate) struct Weighted {
     pub(crate) surface: Surface,
-    /// (sum w l l^T)^-1.
-    pub(crate) inverse: [[f32; LANES]; 6],
     /// sum w r^2 over the lights used.
     pub(crate) chi_square: [f32; LANES],
+    /// Lights that count as behind the surface although they are clearly seen.
+    pub(crate) overlooked: [f32; LANES],
+}
+
+impl Weighted {
+    /// Whether noise explains the residual of lane `k`.
+    #[inline(always)]
+    pub(crate) fn fits(&self, k: usize) -> bool {
+        let freedom = (self.surface.count[k] as usize).saturating_sub(3);
+        self.chi_square[k] <= chi_square_limit(freedom) as f32
+    }
+
+    /// Whether lane `k` asks for the subset test.
+    #[inline(always)]
+    pub(crate) fn is_suspect(&self, k: usize) -> bool {
+        self.overlooked[k] > 0.0 || !self.fits(k)
+    }
 }
 
 /// Plain start, then reweighted solves.
@@ -36,7 +50,7 @@ pub(crate) fn solve_weighted(block: &mut Block) -> Weighted {
 }
 
 #[inline(always)]
-fn step(g: &mut [[f32; LANES]; 3], inverse: &[[f32; LANES]; 6], sums: &Sums) {
+pub(crate) fn step(g: &mut [[f32; LANES]; 3], inverse: &[[f32; LANES]; 6], sums: &Sums) {
     let change = times(inverse, &sums.right);
     for (g, change) in g.iter_mut().zip(&change) {
         for k in 0..LANES {
@@ -54,7 +68,7 @@ pub(crate) fn finish(
     condition_squared: &[f32; LANES],
 ) -> Weighted {
     let mut surface = Surface::new(g, MOST_LENGTHENING);
-    let mut chi_square = ZERO;
+    let (mut chi_square, mut overlooked) = (ZERO, ZERO);
     let [gx, gy, gz] = &surface.g;
     for sample in &block.sample {
         let [lx, ly, lz] = &sample.light;
@@ -65,6 +79,8 @@ pub(crate) fn finish(
             chi_square[k] += w * residual * residual;
             surface.squares[k] += used * residual * residual;
             surface.count[k] += used;
+            let seen = sample.y[k] > START_LEVEL as f32 * block.level[k];
+            overlooked[k] += if seen & (w == 0.0) { sample.usable[k] } else { 0.0 };
         }
     }
     let (normal, _) = surface.normal_and_length();
@@ -74,5 +90,5 @@ pub(crate) fn finish(
         surface.tangent_variance[k] = inverse[0][k] + inverse[3][k] + inverse[5][k] - along;
         surface.carried[k] = condition_squared[k] < WEIGHTED_CONDITION_SQUARED;
     }
-    Weighted { surface, inverse, chi_square }
+    Weighted { surface, chi_square, overlooked }
 }

@@ -1,8 +1,9 @@
 //! The statistical limit: Lambertian facets with the reference sensor's noise.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::scene::{Random, Scene, Solved, angle_deg, reference_lights, tilted};
+use super::scene::{Random, Scene, Solved, angle_deg, many_lights, reference_lights, tilted};
+use crate::photometry::reference::variance;
 use crate::photometry::{Method, Outcome};
 
 struct Figures {
@@ -52,24 +53,103 @@ fn figures(scene: &Scene, solved: &Solved) -> Figures {
     }
 }
 
+/// RMS over the limit: 1.03 and what 8000 samples leave open (1 / sqrt(4 n), three times).
+const AT_THE_LIMIT: f64 = 1.03 + 0.017;
+
 #[test]
 fn lambertian_facets_reach_the_limit() {
     let mut random = Random::new(7);
     for albedo in [0.02, 0.1, 0.5, 0.9] {
-        for tilt_deg in [0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0] {
+        for tilt_deg in [0.0, 30.0, 45.0, 60.0, 75.0] {
             let facet = |_| (tilted(&mut random, tilt_deg), albedo);
-            let mut scene = Scene::new(&reference_lights(), 20_000, 64, facet);
+            let mut scene = Scene::new(&reference_lights(), 8_000, 64, facet);
             scene.add_noise(&mut random);
-            for method in [Method::LeastSquares, Method::Weighted] {
-                let f = figures(&scene, &scene.fast(method));
-                println!(
-                    "{albedo:4} {tilt_deg:2} {method:12?}: {:.3} x limit, bias {:+.3} %, expected {:.3}, fitted {:.4}",
-                    f.rms_over_limit,
-                    100.0 * f.albedo_bias,
-                    f.expected_over_rms,
-                    f.fitted
-                );
+            for method in [Method::Weighted, Method::Auto] {
+                check_limit(&scene, method, albedo, tilt_deg);
             }
         }
     }
+}
+
+fn check_limit(scene: &Scene, method: Method, albedo: f64, tilt_deg: f64) {
+    let f = figures(scene, &scene.fast(method));
+    let place = format!(
+        "albedo {albedo} at {tilt_deg} deg, {method:?}: {:.3} x limit, bias {:+.3} %, expected {:.3} x, fitted {:.4}",
+        f.rms_over_limit,
+        100.0 * f.albedo_bias,
+        f.expected_over_rms,
+        f.fitted
+    );
+    println!("{place}");
+    assert!(f.rms_over_limit < AT_THE_LIMIT, "{place}");
+    assert!((f.expected_over_rms - 1.0).abs() < 0.05, "{place}");
+    // At 75 degrees, five lights are lit by 8 electrons' worth of grazing signal at albedo 0.02: whether one of them
+    // counts as lit depends on its noise, and that leaves a bias.
+    let bias = match (albedo, tilt_deg) {
+        (0.02, 75.0) => 0.006,
+        (0.02, _) => 0.0025,
+        _ => 0.001,
+    };
+    let sampling = 3.0 * 0.02 / (50.0 * albedo * scene.width as f64).sqrt();
+    assert!(f.albedo_bias.abs() < bias + sampling, "{place}");
+    assert!(f.fitted > 0.998 - 3.0 * (0.002 / scene.width as f64).sqrt(), "{place}");
+}
+
+/// Mean angular errors of facets of albedo 0.5 tilted up to 45 degrees, `count` samples spoilt: of weighted least squares on
+/// the true inliers with the true variances (the oracle), and of the methods.
+fn outlier_errors(lights: &[Vector3<f64>], count: usize, methods: &[Method]) -> (f64, Vec<f64>) {
+    let mut random = Random::new(8);
+    let mut scene = Scene::new(lights, 4000, 64, |_| {
+        let tilt = random.between(0.0, 45.0);
+        (tilted(&mut random, tilt), 0.5)
+    });
+    let spoilt = scene.spoil(count, &mut random);
+    scene.add_noise(&mut random);
+    let oracle = (0..scene.width)
+        .map(|column| angle_deg(&oracle(&scene, column, spoilt[column]), &scene.normal[column]));
+    let oracle = oracle.sum::<f64>() / scene.width as f64;
+    let mean = |solved: Solved| {
+        let errors =
+            (0..scene.width).map(|column| angle_deg(&solved.normal(column), &scene.normal[column]));
+        errors.sum::<f64>() / scene.width as f64
+    };
+    (oracle, methods.iter().map(|&method| mean(scene.fast(method))).collect())
+}
+
+fn oracle(scene: &Scene, column: usize, spoilt: u64) -> Vector3<f64> {
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for light in (0..scene.lights).filter(|&i| spoilt >> i & 1 == 0 && scene.clean(i, column) > 0.0)
+    {
+        let l = scene.field().at(column, light);
+        let variance =
+            variance(&scene.variance[light][column & 1], scene.clean(light, column), 1.0);
+        matrix += l * l.transpose() / variance;
+        right += l * f64::from(scene.signal[light][column]) / variance;
+    }
+    matrix.try_inverse().unwrap() * right
+}
+
+#[test]
+fn gross_outliers_cost_little() {
+    for (count, most) in [(0, 1.01), (1, 1.05), (2, 1.05), (3, 1.05), (4, 1.5)] {
+        check_outliers(&reference_lights(), count, most);
+        check_outliers(&many_lights(12), count, most);
+    }
+    // Beyond what can be searched exactly.
+    for (lights, count, most) in [(20, 3, 1.05), (20, 4, 1.1), (40, 6, 1.05), (64, 16, 1.1)] {
+        check_outliers(&many_lights(lights), count, most);
+    }
+}
+
+/// Mean error over the oracle's.
+fn check_outliers(lights: &[Vector3<f64>], count: usize, most: f64) {
+    let (oracle, errors) =
+        outlier_errors(lights, count, &[Method::LeastSquares, Method::Robust, Method::Auto]);
+    let place = format!(
+        "{count} of {} spoilt: oracle {oracle:.3} deg, LS, robust, auto {errors:.3?}",
+        lights.len()
+    );
+    println!("{place}");
+    assert!(errors[1].max(errors[2]) <= most * oracle, "{place}");
+    assert!((errors[1] - errors[2]).abs() < 0.01, "{place}");
 }

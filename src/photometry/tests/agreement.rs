@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::scene::{Random, Scene, Solved, angle_deg, reference_lights, tilted};
+use super::scene::{Random, Scene, Solved, angle_deg, many_lights, reference_lights, tilted};
 use crate::photometry::{Method, Outcome};
 
 /// What the fast path may differ from the reference, degrees, at albedo 0.01 and above.
@@ -73,6 +73,31 @@ fn fast_weighted_is_the_reference() {
         let scene = facets(width, step, &lights, 75.0, 2);
         let method = Method::Weighted;
         check_same(&format!("{width} by {step}"), &scene.fast(method), &scene.reference(method));
+    }
+}
+
+#[test]
+fn fast_subset_test_is_the_reference() {
+    for (lights, name) in
+        [(reference_lights(), "ten"), (many_lights(20), "twenty"), (many_lights(5), "five")]
+    {
+        let mut random = Random::new(6);
+        let mut scene = Scene::new(&lights, 300, 64, |_| {
+            let tilt = random.between(0.0, 60.0);
+            (tilted(&mut random, tilt), random.between(0.02, 1.0))
+        });
+        scene.spoil(3, &mut random);
+        scene.add_noise(&mut random);
+        for column in (0..scene.width).step_by(3) {
+            scene.signal[random.below(scene.lights)][column] = f32::NAN;
+        }
+        for method in [Method::Robust, Method::Auto] {
+            check_same(
+                &format!("{name} {method:?}"),
+                &scene.fast(method),
+                &scene.reference(method),
+            );
+        }
     }
 }
 

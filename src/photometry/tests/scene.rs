@@ -54,6 +54,18 @@ pub(crate) fn reference_lights() -> Vec<Vector3<f64>> {
     ring(6, 45.0, 0.0).chain(ring(4, 62.0, 0.5)).collect()
 }
 
+/// Lights spread evenly over the upper hemisphere between 35 and 75 degrees of elevation (a golden spiral).
+pub(crate) fn many_lights(count: usize) -> Vec<Vector3<f64>> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let light = |i: usize| {
+        let share = (i as f64 + 0.5) / count as f64;
+        let z = 35_f64.to_radians().sin() * (1.0 - share) + 75_f64.to_radians().sin() * share;
+        let (radius, azimuth) = ((1.0 - z * z).sqrt(), golden * i as f64);
+        560.0 * Vector3::new(radius * azimuth.cos(), radius * azimuth.sin(), z)
+    };
+    (0..count).map(light).collect()
+}
+
 /// Light vectors in one row of columns `pitch_mm` apart, relative to 1 at the reference distance.
 pub(crate) fn near_field(
     positions_mm: &[Vector3<f64>],
@@ -139,6 +151,29 @@ impl Scene {
                 *y += (f64::from(variance).sqrt() * random.gauss()) as f32;
             }
         }
+    }
+
+    /// Spoils `count` lit samples of every photosite before the noise comes: shadow of 0 to 30 % or highlight of 150 to 400 %.
+    /// Returns which.
+    pub(crate) fn spoil(&mut self, count: usize, random: &mut Random) -> Vec<u64> {
+        let mut spoilt = vec![0; self.width];
+        for column in 0..self.width {
+            let brightest = (0..self.lights).map(|i| self.clean(i, column)).fold(0.0, f64::max);
+            let lit: Vec<usize> =
+                (0..self.lights).filter(|&i| self.clean(i, column) > 0.02 * brightest).collect();
+            let spare = lit.len().saturating_sub(4);
+            while u64::count_ones(spoilt[column]) < count.min(spare) as u32 {
+                let light = lit[random.below(lit.len())];
+                if spoilt[column] >> light & 1 == 0 {
+                    spoilt[column] |= 1 << light;
+                    let shadow = random.below(2) == 0;
+                    let factor =
+                        if shadow { random.between(0.0, 0.3) } else { random.between(1.5, 4.0) };
+                    self.signal[light][column] *= factor as f32;
+                }
+            }
+        }
+        spoilt
     }
 
     pub(crate) fn field(&self) -> FieldRow<'_> {

@@ -1,0 +1,122 @@
+//! The subset test of a block: two searches, the first with weights that no fit has spoilt, the second with those of the
+//! survivors' fit; then the weighted solution of what is left. The reference says the same in
+//! `reference_robust`.
+
+use super::block::{Block, LANES, Lanes, ZERO};
+use super::method::{DARK_SHARE, MAX_LIGHTS, MOST_LIGHTS_EXACT, SEARCH_SAMPLES};
+use super::normal_equations::{Weighting, accumulate, times, variance};
+use super::row::Outcome;
+use super::subset::{SubsetSearch, WIDE, Whitened};
+use super::tighten::tighten;
+use super::weighted::{Weighted, finish, step};
+
+/// Buffers of the subset test.
+#[derive(Default)]
+pub(crate) struct RobustSolver {
+    samples: Whitened,
+    search: SubsetSearch,
+}
+
+impl RobustSolver {
+    /// Solves every photosite of a block by the subset test; writes the outcomes into the surface.
+    #[inline(always)]
+    pub(crate) fn solve(&mut self, block: &mut Block) -> Weighted {
+        first_weights(block);
+        let dropped = self.search(block);
+        block.keep_others(&dropped);
+        let sums = accumulate(block, &[ZERO; 3], Weighting::Kept);
+        let mut g = times(&sums.inverse().0, &sums.right);
+        let sums = accumulate(block, &g, Weighting::Noise);
+        step(&mut g, &sums.inverse().0, &sums);
+
+        block.readmit();
+        accumulate(block, &g, Weighting::Noise);
+        let dropped = self.search(block);
+        block.keep_others(&dropped);
+        let sums = accumulate(block, &g, Weighting::Kept);
+        step(&mut g, &sums.inverse().0, &sums);
+        let sums = accumulate(block, &g, Weighting::Noise);
+        let (inverse, condition_squared) = sums.inverse();
+        step(&mut g, &inverse, &sums);
+        let mut solved = finish(block, g, inverse, &condition_squared);
+        judge(block, &dropped, &mut solved);
+        solved
+    }
+
+    #[inline(always)]
+    fn search(&mut self, block: &Block) -> [u64; LANES] {
+        let mut dropped = [0; LANES];
+        for first in (0..block.len).step_by(WIDE) {
+            self.samples.take(block, first);
+            let found = if block.sample.len() <= MOST_LIGHTS_EXACT {
+                self.search.best(&self.samples)
+            } else {
+                tighten(&self.samples)
+            };
+            dropped[first..first + WIDE].copy_from_slice(&found);
+        }
+        dropped
+    }
+}
+
+/// 1 / var at the median sample; samples in shadow are set aside.
+#[inline(always)]
+fn first_weights(block: &mut Block) {
+    let median = medians(block);
+    let least = block.least_variance();
+    let mut bright = ZERO;
+    for sample in &block.sample {
+        for k in 0..LANES {
+            let counts = sample.y[k] > DARK_SHARE as f32 * median[k];
+            bright[k] += if counts { sample.usable[k] } else { 0.0 };
+        }
+    }
+    for sample in &mut block.sample {
+        let [even, odd] = sample.variance;
+        for k in 0..LANES {
+            let model = if block.odd[k] == 0 { even } else { odd };
+            let variance = variance(model, median[k], block.noise_scale[k]).max(least[k]);
+            let few = bright[k] < SEARCH_SAMPLES as f32;
+            let counts = few | (sample.y[k] > DARK_SHARE as f32 * median[k]);
+            sample.weight[k] = if counts { sample.usable[k] / variance } else { 0.0 };
+        }
+    }
+}
+
+/// The middle usable sample, the upper one of two.
+fn medians(block: &Block) -> Lanes {
+    let mut median = ZERO;
+    for k in 0..block.len {
+        let mut values = [0.0_f32; MAX_LIGHTS];
+        let mut count = 0;
+        for sample in block.sample.iter().filter(|sample| sample.usable[k] > 0.0) {
+            values[count] = sample.y[k];
+            count += 1;
+        }
+        if count > 0 {
+            median[k] = *values[..count].select_nth_unstable_by(count / 2, f32::total_cmp).1;
+        }
+    }
+    median
+}
+
+/// What the dropped samples of each photosite have in common.
+fn judge(block: &Block, dropped: &[u64; LANES], solved: &mut Weighted) {
+    for k in 0..block.len {
+        let (mut dark, mut bright) = (false, false);
+        for (_, sample) in
+            block.sample.iter().enumerate().filter(|&(i, _)| dropped[k] >> i & 1 == 1)
+        {
+            let above = sample.y[k] > solved.surface.predicted(sample, k);
+            bright |= above;
+            dark |= !above;
+        }
+        solved.surface.outcome[k] = match (dark, bright) {
+            (true, false) => Outcome::Shadow,
+            (false, true) => Outcome::Highlight,
+            (true, true) => Outcome::Other,
+            (false, false) if solved.fits(k) => Outcome::Fitted,
+            (false, false) => Outcome::Other,
+        };
+    }
+}
