@@ -339,6 +339,17 @@ fn a_full_disk() {
 }
 
 #[test]
+fn the_root_of_a_disk() {
+    on_a_disk("size=1m", |home, _| {
+        home.run("solve s --calibration c --out disk").expect_failure(
+            "root",
+            1,
+            &["disk", "root of a disk"],
+        );
+    });
+}
+
+#[test]
 fn a_read_only_disk() {
     on_a_disk("ro", |home, disk| {
         home.run("solve s --calibration c --out disk/maps").expect_failure(

@@ -112,6 +112,11 @@ fn rooms_use_only_the_rooms_below_them() {
     check("raw", &[&top[..], &["session", "instrument"]].concat());
     check("session", &top);
     check("instrument", &top);
+    check("compare", &[&top[..], &["raw", "session", "instrument", "demo", "device"]].concat());
+    check(
+        "doctor",
+        &[&top[..], &["raster", "raw", "session", "instrument", "compare", "demo"]].concat(),
+    );
     check("solution", &["cli", "report", "calibrate", "solve", "simulate", "photometry"]);
     check("solve", &["cli", "report", "calibrate", "simulate"]);
     check("simulate", &["cli", "report", "calibrate", "solve", "photometry"]);

@@ -46,6 +46,7 @@ impl StagedFolder {
         let target = absolute(target)?;
         check_free(&target, kind)?;
         let parent = parent_of(&target).to_owned();
+        check_one_disk(&target, &parent)?;
         let made_parents = make_parents(&parent)?;
         let prefix =
             format!(".{}.partial-", target.file_name().unwrap_or_default().to_string_lossy());
@@ -159,6 +160,22 @@ fn check_free(target: &Path, kind: OutputKind) -> Result<(), FileError> {
             Err(occupied(target, format!("holds {name}; a {} is never replaced", kind.name)))
         }
     }
+}
+
+/// A folder cannot be renamed onto the root of another disk; said before the work, not after it.
+#[cfg(unix)]
+fn check_one_disk(target: &Path, parent: &Path) -> Result<(), FileError> {
+    use std::os::unix::fs::MetadataExt;
+    let disk = |path: &Path| fs::metadata(path).map(|metadata| metadata.dev()).ok();
+    match (disk(target), disk(parent)) {
+        (Some(a), Some(b)) if a != b => Err(occupied(target, "is the root of a disk".to_owned())),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn check_one_disk(_target: &Path, _parent: &Path) -> Result<(), FileError> {
+    Ok(())
 }
 
 fn occupied(target: &Path, what: String) -> FileError {

@@ -15,6 +15,9 @@ use weavelight_calibration::description::{DirectionalLight, Image, Light, PointL
 /// The file's name in a calibration folder.
 pub const LIGHTS_FILE: &str = "lights.toml";
 
+/// Intensities of any unit that a sensor could tell; beyond, quotients leave the range of float32.
+const INTENSITIES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LightsFile {
@@ -116,7 +119,7 @@ fn light_from_table(
     key: &str,
     table: LightTable,
 ) -> Result<CalibratedLight, FileError> {
-    if table.intensity.iter().any(|i| *i <= 0.0) {
+    if table.intensity.iter().any(|i| !INTENSITIES.contains(i)) {
         let what = format!(
             "is {:?}; every channel must be positive (a dead light is left out of the frames)",
             table.intensity

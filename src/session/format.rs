@@ -137,7 +137,10 @@ impl Session {
     }
 }
 
-fn session_from_manifest(folder: &Path, document: &Document) -> Result<Session, FileError> {
+pub(super) fn session_from_manifest(
+    folder: &Path,
+    document: &Document,
+) -> Result<Session, FileError> {
     let manifest: Manifest = document.parse(SCHEMA)?;
     let kind = Kind::from(manifest.kind);
     let folder_name = || {

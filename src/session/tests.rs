@@ -143,6 +143,11 @@ fn impossible_manifests_are_told_with_line_and_remedy() {
         "[[frames]]\nfile = \"b.png\"\niso = 100\n",
         "S/session.toml:8: `frames[1].exposure_s` is missing",
     );
+    check(
+        HEAD,
+        "[[frames]]\nfile = \"b.png\"\nexposure_s = 1e300\niso = 100\n",
+        "S/session.toml:10: `frames[1].exposure_s` is 1",
+    );
     check(HEAD, FRAME, "S/session.toml:9: `frames[1].file` is a.png, as in frames[0]");
     check(HEAD, "sha256 = \"12\"\n", "S/session.toml:8: `frames[0].sha256` is no SHA-256");
     check(HEAD, "cfa = \"RGBX\"\n", "S/session.toml:8: `frames[0].cfa` is \"RGBX\"");
@@ -257,4 +262,26 @@ fn a_light_beyond_the_rig_is_named() {
     session.check_lights(11).unwrap();
     let error = session.check_lights(10).unwrap_err().to_string();
     assert!(error.contains("b.dng is of light 10, but there are lights 0 to 9 only"), "{error}");
+}
+
+/// Manifests cut off anywhere, or with any byte replaced, are read or refused; they never panic.
+#[test]
+fn damaged_manifests_never_panic() {
+    let path = Path::new("session.toml");
+    let bytes = EVERYTHING.as_bytes();
+    let check = |damaged: &[u8]| {
+        let text = String::from_utf8_lossy(damaged).into_owned();
+        let document = crate::files::Document::new(path, text);
+        if let Err(error) = super::format::session_from_manifest(Path::new("s"), &document) {
+            assert!(error.to_string().lines().count() <= 2, "{error}");
+        }
+    };
+    for place in 0..bytes.len() {
+        check(&bytes[..place]);
+        for replacement in [b'"', b'[', b'9', b'\n', b'=', 0xff] {
+            let mut damaged = bytes.to_vec();
+            damaged[place] = replacement;
+            check(&damaged);
+        }
+    }
 }
