@@ -87,6 +87,8 @@ fn opencv_stays_in_one_module() {
     let modules: BTreeSet<String> = ["calibration/src", "sim/src", "src"]
         .iter()
         .flat_map(|folder| mentions(folder, &["opencv::"]))
+        // Our own modules named after its presence or absence are not the library.
+        .filter(|place| !place.contains("_opencv::"))
         .filter_map(|place| place.split(':').next().map(str::to_owned))
         .collect();
     assert!(modules.len() <= 1, "OpenCV is used in more than one module: {modules:?}");
