@@ -1,28 +1,32 @@
 //! `weavelight doctor`
 
 use super::output::{Failure, Output};
-use crate::doctor::{Examination, SerialPort, examine};
+use crate::doctor::{Examination, LightBoard, SerialPort, examine, examine_boards};
+use crate::instrument::Rig;
 use std::path::PathBuf;
 
 /// Say what of the machine and the instrument is there and usable
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  weavelight doctor")]
+#[command(after_help = "Examples:\n  weavelight doctor\n  weavelight doctor --rig rig.toml")]
 pub(super) struct Args {
     /// Folder that outputs would go to
     #[arg(long, value_name = "DIR", default_value = ".")]
     folder: PathBuf,
+    /// Look for the light board that this rig describes, instead of any
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
+    let rig = args.rig.as_deref().map(Rig::load).transpose().map_err(Failure::work)?;
     let examination = examine(&args.folder);
-    Ok(Output {
-        text: text(&examination),
-        json: serde_json::to_value(&examination).map_err(Failure::work)?,
-        ..Output::default()
-    })
+    let boards = examine_boards(rig.as_ref());
+    let mut json = serde_json::to_value(&examination).map_err(Failure::work)?;
+    json["light_boards"] = serde_json::to_value(&boards).map_err(Failure::work)?;
+    Ok(Output { text: text(&examination, &boards), json, ..Output::default() })
 }
 
-fn text(found: &Examination) -> String {
+fn text(found: &Examination, boards: &[LightBoard]) -> String {
     let mut lines = vec![
         format!("program    {}", found.program),
         format!("boards     {}", chessboards(found)),
@@ -36,6 +40,7 @@ fn text(found: &Examination) -> String {
         );
     }
     lines.extend(found.serial_ports.iter().map(|port| format!("serial     {}", serial(port))));
+    lines.extend(boards.iter().map(|board| format!("lights     {}", light_board(board))));
     lines.push("camera     tethered cameras are not part of this version; copy frames into a capture session".to_owned());
     lines.join("\n")
 }
@@ -75,4 +80,18 @@ fn serial(port: &SerialPort) -> String {
     } else {
         format!("{path} may not be opened; run `sudo usermod -aG dialout $USER` and log in again")
     }
+}
+
+fn light_board(board: &LightBoard) -> String {
+    if let Some(problem) = &board.problem {
+        return problem.clone();
+    }
+    let extras = [(board.back_light, ", back light"), (board.trigger, ", camera trigger")];
+    let extras: String = extras.iter().filter(|extra| extra.0).map(|extra| extra.1).collect();
+    let firmware = board.firmware.as_deref().unwrap_or("unknown");
+    let lights = board.lights.unwrap_or_default();
+    format!(
+        "{}: light board with firmware {firmware}, {lights} lights{extras}",
+        board.port.display()
+    )
 }

@@ -1,5 +1,7 @@
 //! What of the machine and the instrument is there and usable, without touching any of it.
 
+use crate::device::board::{BoardError, Identity, PortChoice, PortFinding, diagnose};
+use crate::instrument::{Controller, Rig};
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +36,49 @@ pub struct SerialPort {
     pub usable: bool,
 }
 
-/// Looks around. Ports are not opened: that would reset the controller.
+/// A light board, or why a port has none.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LightBoard {
+    /// Where.
+    pub port: PathBuf,
+    /// Version of its firmware, if one answers.
+    pub firmware: Option<String>,
+    /// How many lights it has.
+    pub lights: Option<u8>,
+    /// It has an output for a back light.
+    pub back_light: bool,
+    /// It has a trigger output for a camera.
+    pub trigger: bool,
+    /// What is wrong and what to do; `None` where all is well.
+    pub problem: Option<String>,
+}
+
+/// Asks for light boards at the port that the rig names, or at every port that could be one's. Opening a port restarts the
+/// board behind it; one in use by a scan is told as busy and left alone. Takes up to five seconds where nobody answers.
+pub fn examine_boards(rig: Option<&Rig>) -> Vec<LightBoard> {
+    let choice = match rig.and_then(|rig| rig.controller.as_ref()) {
+        Some(Controller::Simulated) => return Vec::new(),
+        Some(Controller::Serial { port: Some(port) }) => PortChoice::Path(port.into()),
+        Some(Controller::Serial { port: None }) | None => PortChoice::Find,
+    };
+    diagnose(&choice, rig.map(|rig| rig.lights.len())).into_iter().map(light_board).collect()
+}
+
+fn light_board(finding: PortFinding) -> LightBoard {
+    let PortFinding { port, result } = finding;
+    let problem = result.as_ref().err().map(BoardError::to_string);
+    let board = result.ok();
+    LightBoard {
+        port,
+        lights: board.as_ref().and_then(|board| board.lights),
+        back_light: board.as_ref().is_some_and(|board| board.back_light),
+        trigger: board.as_ref().is_some_and(|board| board.trigger),
+        firmware: board.map(|Identity { firmware, .. }| firmware),
+        problem,
+    }
+}
+
+/// Looks around. Ports are not opened: see [`examine_boards`].
 pub fn examine(folder: &Path) -> Examination {
     Examination {
         program: crate::files::PROGRAM,

@@ -291,3 +291,37 @@ fn a_port_with_something_else_behind_it() {
         check.join().unwrap();
     }
 }
+
+#[test]
+fn doctor_finds_the_board_of_the_rig() {
+    let Some(sim) = SimBoard::on_a_port(&[]) else { return };
+    let rig = sim.port().with_file_name("rig.toml");
+    let doctor = |lights: usize| {
+        let mut text = format!(
+            "schema = 1\n[camera]\nwidth_px = 64\nheight_px = 48\n[controller]\nkind = \"serial\"\nport = {:?}\n",
+            sim.port()
+        );
+        for i in 0..lights {
+            text += &format!(
+                "[[lights]]\nposition_mm = [{}.0, {}.0, 400.0]\n",
+                100 * (i % 4),
+                100 * (i / 4)
+            );
+        }
+        std::fs::write(&rig, text).unwrap();
+        let output = assert_cmd::Command::cargo_bin("weavelight")
+            .unwrap()
+            .arg("doctor")
+            .arg("--rig")
+            .arg(&rig)
+            .output();
+        String::from_utf8(output.unwrap().stdout).unwrap()
+    };
+    let found = doctor(10);
+    assert!(
+        found.contains("light board with firmware 1.0.0, 10 lights, back light, camera trigger"),
+        "{found}"
+    );
+    let found = doctor(8);
+    assert!(found.contains("the board has 10 lights, rig.toml has 8"), "{found}");
+}

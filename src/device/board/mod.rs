@@ -19,3 +19,4 @@ pub use machine::{
     BUDGET, Busy, Event, Failure, IDENTIFY_BUDGET, IDENTIFY_RETRY, Interruption, KEEP_ALIVE,
     LightBoard, RETRY, RETRY_AT_ONCE,
 };
+pub use wire::{Identity, Outputs, Setting};
