@@ -1,5 +1,8 @@
 use std::path::PathBuf;
 
+/// Characters of a library's message that an error repeats.
+const LONGEST_REASON: usize = 160;
+
 /// Why bytes are no usable picture. The message says what is wrong and what to do; whoever knows the path adds it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureError {

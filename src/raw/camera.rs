@@ -66,7 +66,8 @@ pub(crate) fn load(bytes: &[u8], want: Want) -> Result<RawImage, DecodeError> {
         // rawloader's own words run over several lines and name its issue tracker.
         image.map_err(|error| {
             let text = error.to_string();
-            let reason = text.lines().next().unwrap_or_default().trim_end_matches('.').to_owned();
+            let line = text.lines().next().unwrap_or_default();
+            let reason: String = line.trim_end_matches('.').chars().take(160).collect();
             DecodeError::unsupported(format!("this RAW file ({reason})"), CONVERT_TO_DNG)
         })
     })

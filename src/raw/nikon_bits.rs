@@ -3,9 +3,17 @@
 /// Longest code of any of the trees, bits.
 const LONGEST_CODE: u32 = 11;
 
-/// A code: for every possible next [`LONGEST_CODE`] bits, which symbol they begin with.
+/// Next bits that the fast table looks at: most differences and their codes fit in.
+const FAST: u32 = 13;
+
+/// A code, its symbols' bits included.
 #[derive(Debug)]
 pub(crate) struct Tree {
+    /// For every possible next [`FAST`] bits: the difference they begin with and its length in bits, code included; a
+    /// length of 0 where it is longer.
+    fast: Vec<(i16, u8)>,
+    /// For every possible next [`LONGEST_CODE`] bits: which symbol they begin with.
+    ///
     /// Length of the code and its symbol. The symbol's low half is the number of bits of the difference, its high half how many
     /// of those, the lowest, are left out.
     table: Vec<[u8; 2]>,
@@ -60,7 +68,21 @@ impl Tree {
             ));
         }
         table.resize(1 << LONGEST_CODE, [LONGEST_CODE as u8, 0]);
-        Self { table }
+        let mut tree = Self { fast: Vec::new(), table };
+        tree.fast = (0..1 << FAST).map(|bits: u32| tree.fast_entry(bits)).collect();
+        tree
+    }
+
+    fn fast_entry(&self, bits: u32) -> (i16, u8) {
+        let padded = (bits << (32 - FAST)).to_be_bytes();
+        let mut differences = Differences::new(&padded);
+        differences.fill();
+        let before = differences.held;
+        let difference = differences.next_by_code(self);
+        match (before - differences.held, i16::try_from(difference)) {
+            (length, Ok(difference)) if length <= FAST => (difference, length as u8),
+            _ => (0, 0),
+        }
     }
 }
 
@@ -116,11 +138,22 @@ impl<'a> Differences<'a> {
     }
 
     /// The next difference.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn next(&mut self, tree: &Tree) -> i32 {
         if self.held < 32 {
             self.fill();
         }
+        match tree.fast[(self.buffer >> (64 - FAST)) as usize] {
+            (_, 0) => self.next_by_code(tree),
+            (difference, length) => {
+                self.skip(length.into());
+                difference.into()
+            }
+        }
+    }
+
+    /// The next difference, by its code and its bits; 32 bits must be held.
+    fn next_by_code(&mut self, tree: &Tree) -> i32 {
         let [code_length, symbol] = tree.table[(self.buffer >> (64 - LONGEST_CODE)) as usize];
         self.skip(code_length.into());
         let (length, omitted) = (u32::from(symbol & 15), u32::from(symbol >> 4));
@@ -181,6 +214,29 @@ mod tests {
         check("010 111111 100 00000 100 01111", &Tree::lossless(14), &[63, -31, -16]);
         // After the split, 010 is twelve bits of which seven are stored... the low five read as 10000.
         check("010 1000000 010 0000000", &Tree::lossy_after_split(14), &[2048 + 16, -4096 + 16]);
+    }
+
+    /// The fast table against the code, over pseudo-random bits (splitmix64).
+    #[test]
+    fn both_ways_to_read_agree() {
+        let mix = |i: u64| {
+            let z = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z ^ (z >> 27)
+        };
+        let bytes: Vec<u8> = (0..4000).flat_map(|i| mix(i).to_le_bytes()).collect();
+        for bits in [12, 14] {
+            for tree in [Tree::lossless(bits), Tree::lossy(bits), Tree::lossy_after_split(bits)] {
+                let (mut fast, mut plain) = (Differences::new(&bytes), Differences::new(&bytes));
+                while !fast.overrun() {
+                    if plain.held < 32 {
+                        plain.fill();
+                    }
+                    assert_eq!(fast.next(&tree), plain.next_by_code(&tree));
+                }
+                assert!(plain.overrun());
+            }
+        }
     }
 
     #[test]

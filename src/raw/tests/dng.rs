@@ -1,6 +1,7 @@
 //! Every way to store a DNG's samples gives the same frame.
 
 use super::builder::{Entries, Value, tiff};
+use super::ljpeg;
 use crate::raw::tags::{Order, tag};
 use crate::raw::{DecodeError, Frame, Hint, Layout, Samples, decode, decode_uncropped};
 use std::io::Write;
@@ -50,13 +51,20 @@ fn segment(all: &[u16], kind: Kind, x0: usize, y0: usize) -> Vec<u8> {
     // The last strip is short; tiles are padded to their full size.
     let rows = if width == WIDTH { height.min(HEIGHT - y0) } else { height };
     let mut bytes = Vec::new();
+    let mut values = Vec::new();
     for y in y0..y0 + rows {
-        let at = |x: usize| if x < WIDTH && y < HEIGHT { all[y * WIDTH + x] } else { 0xaaaa };
+        let at = |x: usize| if x < WIDTH && y < HEIGHT { all[y * WIDTH + x] } else { 0x00aa };
         let mut row: Vec<u16> = (x0..x0 + width).map(at).collect();
         if kind.predictor == 2 {
             (1..width).rev().for_each(|x| row[x] = row[x].wrapping_sub(row[x - 1]));
         }
         bytes.extend(packed(&row, kind));
+        values.extend(row);
+    }
+    if kind.compression == 7 {
+        // Cameras call two neighbours the components of one column.
+        let components = if width % 2 == 0 { 2 } else { 1 };
+        return ljpeg::encode(&values, width / components, components, kind.bits as u8);
     }
     if kind.compression == 1 {
         return bytes;
@@ -150,6 +158,17 @@ fn every_storage_gives_the_same_samples() {
             }
             for (bits, predictor) in [(16, 1), (16, 2), (8, 2)] {
                 check_samples(Kind { order, bits, segment, compression: 8, predictor });
+            }
+        }
+    }
+}
+
+#[test]
+fn lossless_jpeg_gives_the_same_samples() {
+    for order in [Order::Little, Order::Big] {
+        for segment in [[WIDTH, HEIGHT], [16, 16], [48, 32]] {
+            for bits in [12, 14, 16] {
+                check_samples(Kind { order, bits, segment, compression: 7, predictor: 1 });
             }
         }
     }

@@ -1,5 +1,6 @@
 mod builder;
 mod dng;
+mod ljpeg;
 mod mutations;
 mod nef;
 mod pictures;

@@ -1,9 +1,10 @@
 //! Damaged files of every kind: an error or a frame, never a panic, never a frame that contradicts itself.
 
+use super::builder::{Value, tiff};
 use super::nef::Random;
 use super::{dng, nef, pictures};
 use crate::raster::encode_exr;
-use crate::raw::tags::Order;
+use crate::raw::tags::{Order, tag};
 use crate::raw::{Encoding, Frame, Hint, Samples, decode};
 use image::ImageFormat;
 
@@ -36,6 +37,54 @@ fn seeds() -> Vec<Vec<u8>> {
     encode_exr(&mut exr, [33, 17], &["Y"], |_, y, row| row.fill(y as f32)).unwrap();
     seeds.push(exr);
     seeds
+}
+
+/// Files that lead into the decoders of other cameras, and then make no sense.
+fn cameras() -> Vec<Vec<u8>> {
+    let heads: [&[u8]; 9] = [
+        b"FUJIFILMCCD-RAW 0201FF393102FinePix X100",
+        b"\0MRM\0\0\x40\0\0PRD",
+        b"IIU\0\x18\0\0\0",
+        b"IIRO\x08\0\0\0",
+        b"MMOR\0\0\0\x08",
+        b"II\x1a\0\0\0HEAPCCDR",
+        b"ARRI\0\x10\0\0",
+        b"II*\0\x10\0\0\0CR\x02\0",
+        b"IIII\x49\x49\x49\x49RawT",
+    ];
+    let mut random = Random(3);
+    let body: Vec<u8> = (0..3000).map(|_| random.below(256) as u8).collect();
+    let mut files: Vec<Vec<u8>> =
+        heads.iter().map(|head| [head, body.as_slice()].concat()).collect();
+    let makers = [
+        ("Canon", "Canon EOS 5D"),
+        ("SONY", "SLT-A77V"),
+        ("PENTAX", "PENTAX K-5"),
+        ("OLYMPUS IMAGING CORP.", "E-PL1"),
+        ("Panasonic", "DMC-G1"),
+        ("SAMSUNG", "NX300"),
+        ("SEIKO EPSON CORP.", "R-D1"),
+        ("Hasselblad", "Hasselblad H3D"),
+        ("EASTMAN KODAK COMPANY", "EOSDCS1B"),
+        ("Leaf", "Aptus 22(LF3779      )/Mamiya"),
+        ("Mamiya-OP Co.,Ltd.", "MAMIYA ZD"),
+        ("NIKON CORPORATION", "NIKON D90"),
+        ("Phase One A/S", "P40+"),
+        ("FUJIFILM", "X-T1"),
+    ];
+    for (make, model) in makers {
+        for compression in [1, 7, 32_767, 32_769, 65_535] {
+            let described = vec![
+                (tag::MAKE, Value::Ascii(make)),
+                (tag::MODEL, Value::Ascii(model)),
+                (tag::COMPRESSION, Value::Short(vec![compression])),
+            ];
+            let mut entries = dng::entries(dng::PLAIN, described);
+            entries.retain(|(tag, _)| *tag != tag::DNG_VERSION);
+            files.push(tiff(Order::Little, &entries));
+        }
+    }
+    files
 }
 
 /// One of: flipped bits, extreme numbers, a cut, a piece copied elsewhere, a piece taken out. Most hits go to the first
@@ -83,8 +132,7 @@ fn is_consistent(frame: &Frame) -> bool {
 }
 
 /// Decodes `rounds` damaged files. A panic that nobody fenced in fails the test by itself.
-fn run(rounds: usize, seed: u64) {
-    let seeds = seeds();
+fn run(seeds: &[Vec<u8>], rounds: usize, seed: u64) {
     let mut random = Random(seed);
     let hint = Hint { cfa: None, encoding: Some(Encoding::Linear) };
     for round in 0..rounds {
@@ -113,7 +161,12 @@ fn sound_files_are_sound() {
 
 #[test]
 fn damaged_files_are_errors_or_frames() {
-    run(6_000, 1);
+    run(&seeds(), 4_000, 1);
+}
+
+#[test]
+fn damaged_files_of_other_cameras_too() {
+    run(&cameras(), 1_500, 2);
 }
 
 /// For an hour's leisure: WEAVELIGHT_FUZZ_ROUNDS=1000000 cargo nextest run --release --run-ignored only mutations
@@ -123,5 +176,6 @@ fn many_damaged_files() {
     let number = |name, default| {
         std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
     };
-    run(number("WEAVELIGHT_FUZZ_ROUNDS", 100_000), number("WEAVELIGHT_FUZZ_SEED", 7) as u64);
+    let all = [seeds(), cameras()].concat();
+    run(&all, number("WEAVELIGHT_FUZZ_ROUNDS", 100_000), number("WEAVELIGHT_FUZZ_SEED", 7) as u64);
 }

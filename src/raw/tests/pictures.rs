@@ -1,6 +1,8 @@
 //! Pictures of other programs as frames.
 
+use super::builder::{Value, tiff};
 use crate::raster::{PngContent, encode_exr, encode_png_rgb8};
+use crate::raw::tags::{Order, tag};
 use crate::raw::{Encoding, Frame, Hint, Layout, Samples, decode};
 use image::{DynamicImage, ImageFormat};
 use std::io::Cursor;
@@ -117,6 +119,22 @@ fn exr_has_no_ceiling_and_keeps_what_is_no_number() {
     assert_eq!(exr(&["Y"], [1.5; 3]).unwrap().layout, Layout::Grey);
     let error = exr(&["U", "V"], [0.0; 3]).unwrap_err().to_string();
     assert!(error.contains("channels U, V"), "{error}");
+}
+
+/// Found by damaging files: the library lists all values of the tag in its message.
+#[test]
+fn messages_are_short() {
+    let entries = vec![
+        (tag::WIDTH, Value::Short(vec![6])),
+        (tag::HEIGHT, Value::Short(vec![4])),
+        (tag::BITS_PER_SAMPLE, Value::Short(vec![16])),
+        (tag::PHOTOMETRIC, Value::Short(vec![1])),
+        (tag::SAMPLE_FORMAT, Value::Short((0..100).collect())),
+        (tag::STRIP_OFFSETS, Value::Blobs(vec![vec![0; 48]])),
+        (tag::STRIP_BYTE_COUNTS, Value::Short(vec![48])),
+    ];
+    let error = decode(&tiff(Order::Little, &entries), &NOTHING).unwrap_err().to_string();
+    assert!(error.len() < 300 && error.lines().count() == 1, "{error}");
 }
 
 fn check_refused(bytes: &[u8], hint: Hint, expected: &str) {
