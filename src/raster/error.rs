@@ -59,11 +59,12 @@ pub enum PictureError {
 
 impl PictureError {
     pub(crate) fn damaged(what: impl Into<String>) -> Self {
-        // Libraries' messages may run over several lines.
+        // Libraries' messages may run over several lines, and list every value of a damaged tag.
         let what: String = what.into();
-        Self::Damaged {
-            what: what.lines().next().unwrap_or_default().trim_end_matches('.').to_owned(),
-        }
+        let line = what.lines().next().unwrap_or_default().trim_end_matches('.');
+        let short: String = line.chars().take(LONGEST_REASON).collect();
+        let rest = if line.len() > short.len() { "..." } else { "" };
+        Self::Damaged { what: short + rest }
     }
 
     pub(crate) fn unsupported(what: impl Into<String>, remedy: &'static str) -> Self {

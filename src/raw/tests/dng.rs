@@ -163,17 +163,6 @@ fn every_storage_gives_the_same_samples() {
     }
 }
 
-#[test]
-fn lossless_jpeg_gives_the_same_samples() {
-    for order in [Order::Little, Order::Big] {
-        for segment in [[WIDTH, HEIGHT], [16, 16], [48, 32]] {
-            for bits in [12, 14, 16] {
-                check_samples(Kind { order, bits, segment, compression: 7, predictor: 1 });
-            }
-        }
-    }
-}
-
 /// The fast path against the library whose samples are right for this one kind.
 #[test]
 fn plain_strips_equal_rawloader() {
