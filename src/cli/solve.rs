@@ -112,8 +112,7 @@ fn text(report: &Report) -> String {
     let percent = |count: u64| 100.0 * count as f64 / report.pixels.max(1) as f64;
     let scale =
         report.mm_per_px.map_or_else(String::new, |scale| format!(", {scale:.4} mm per pixel"));
-    let seconds =
-        report.seconds.get("total").copied().unwrap_or_else(|| report.seconds.values().sum());
+    let seconds: f64 = report.seconds.values().sum();
     format!(
         "{:.1} % of {} photosites solved from {} lights{scale}\n\
          robust path {:.2} %, clipped samples at {:.2} %, residual {:.5} of white, albedo in {}, {seconds:.1} s",

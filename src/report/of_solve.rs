@@ -77,9 +77,8 @@ fn verdicts(
     }
     all.push(verdict(share(report.solved), "of the photosites solved"));
     all.push(verdict(share(report.saturated_pixels), "with a clipped sample"));
-    if let Some(total) = report.seconds.get("total") {
-        all.push(verdict(format!("{total:.2} s"), "from files to files"));
-    }
+    let total: f64 = report.seconds.values().sum();
+    all.push(verdict(format!("{total:.2} s"), "from files to maps"));
     all
 }
 
@@ -170,7 +169,7 @@ fn scaled(values: &Image<[f32; 1]>, distribution: &Distribution, what: &str) -> 
 fn seconds(report: &Report) -> Vec<(String, f64)> {
     let stages = [Stage::Read, Stage::Solve, Stage::Colour, Stage::Write];
     let of = |name: &str| report.seconds.get(name).map(|seconds| (name.to_owned(), *seconds));
-    stages.iter().filter_map(|stage| of(stage.name())).chain(of("total")).collect()
+    stages.iter().filter_map(|stage| of(stage.name())).collect()
 }
 
 /// All at one gain, so that a light that is too dark looks it.

@@ -51,7 +51,7 @@ pub struct Shown<'a> {
     pub name: &'a str,
     /// The maps.
     pub maps: &'a Finished,
-    /// The frames made small, in light order, ambient frames last; linear, each with its caption.
+    /// The frames made small, in light order, ambient frames last; linear, white-balanced for its light, each with its caption.
     pub frames: &'a [(String, Image<[f32; 3]>)],
     /// What the solve says of itself; the page's own time is not in it yet.
     pub report: &'a Report,
@@ -152,18 +152,28 @@ const PREVIEW_SIDE: usize = 320;
 
 fn previews(scene: &Scene) -> Vec<(String, Image<[f32; 3]>)> {
     let lit = scene.lights.iter().flat_map(|light| {
-        light.exposures.iter().map(|exposure| (format!("light {}", light.index), exposure))
+        let balance = balance(light.calibrated.light.intensity());
+        let name = format!("light {}", light.index);
+        light.exposures.iter().map(move |exposure| (name.clone(), exposure, balance))
     });
-    let dark = scene.ambient.iter().map(|exposure| ("ambient".to_owned(), exposure));
-    let all: Vec<(String, &Exposure)> = lit.chain(dark).collect();
+    let dark = scene.ambient.iter().map(|exposure| ("ambient".to_owned(), exposure, [1.0; 3]));
+    let all: Vec<(String, &Exposure, [f32; 3])> = lit.chain(dark).collect();
     all.into_par_iter()
-        .map(|(name, exposure)| {
+        .map(|(name, exposure, balance)| {
             let file = exposure.path.file_name().unwrap_or_default().to_string_lossy();
             let caption =
                 format!("{name}: {file}, {} s, ISO {}", exposure.exposure_s, exposure.iso);
-            (caption, preview(&exposure.frame, PREVIEW_SIDE))
+            let mut small = preview(&exposure.frame, PREVIEW_SIDE);
+            let channels = small.data.iter_mut().flat_map(|rgb| rgb.iter_mut().zip(balance));
+            channels.for_each(|(value, gain)| *value *= gain);
+            (caption, small)
         })
         .collect()
+}
+
+/// Gains that show white as white under a light, green = 1.
+fn balance(intensity: [f64; 3]) -> [f32; 3] {
+    intensity.map(|channel| if channel > 0.0 { (intensity[1] / channel) as f32 } else { 1.0 })
 }
 
 /// What is still needed of a scene when its frames are not: they make room for the files being encoded.
