@@ -42,19 +42,6 @@ pub(crate) fn decode(
     Ok(stored)
 }
 
-/// Samples of a DNG that rawloader decodes right, as stored: `size` is width, height, samples per pixel.
-pub(crate) fn samples(bytes: &[u8], size: [usize; 3]) -> Result<Vec<u16>, DecodeError> {
-    let image = load(bytes, Want::Everything)?;
-    let found = [image.width, image.height, image.cpp];
-    let samples = integers(image.data)?;
-    if found != size || samples.len() != size.iter().product::<usize>() {
-        return Err(DecodeError::damaged(format!(
-            "its decoder found {found:?} where its tags say {size:?}"
-        )));
-    }
-    Ok(samples)
-}
-
 /// rawloader's view of a file.
 pub(crate) fn load(bytes: &[u8], want: Want) -> Result<RawImage, DecodeError> {
     guarded_pool(|| {

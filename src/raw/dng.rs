@@ -1,15 +1,15 @@
 //! DNG: Adobe, "Digital Negative (DNG) specification", version 1.7, 2023.
 //!
-//! Uncompressed and deflated samples are read here, because the library that knows the cameras takes big-endian samples for
-//! little-endian ones, reads only the first strip's place, cannot read uncompressed tiles and leaves out the linearisation
-//! table. It decodes lossless JPEG. The mosaic and the black levels count from the active area's top left (DNG, CFAPattern and
+//! The samples are read here, because the library that knows the cameras takes big-endian samples for little-endian ones,
+//! reads only the first strip's place, cannot read uncompressed tiles nor lossless JPEG of one component, and leaves out
+//! the linearisation table. The mosaic and the black levels count from the active area's top left (DNG, CFAPattern and
 //! BlackLevelRepeatDim).
 
 use super::error::CONVERT_TO_DNG;
 use super::sensor::{self, Area, Stored};
 use super::tags::{Directory, Tiff, tag};
 use super::unpack::Storage;
-use super::{DecodeError, Hint, Layout, camera, metadata};
+use super::{DecodeError, Hint, Layout, metadata};
 
 /// What black levels may differ along rows or columns before that is refused, relative to the range: 0.02 % costs less
 /// than 0.04 degrees of normal.
@@ -32,13 +32,7 @@ pub(crate) fn decode(tiff: &Tiff, hint: &Hint) -> Result<Stored, DecodeError> {
     let layout = layout(directory, &storage, hint)?;
     let white = white_level(directory, storage.bits)?;
     let black = black_levels(directory, layout, white)?;
-    let mut samples = match storage.compression {
-        7 => camera::samples(
-            tiff.block.bytes,
-            [storage.width, storage.height, storage.samples_per_pixel],
-        )?,
-        _ => storage.unpack(tiff)?,
-    };
+    let mut samples = storage.unpack(tiff)?;
     linearize(directory, &mut samples)?;
     Ok(Stored {
         width: storage.width,

@@ -3,12 +3,14 @@
 //! What a file is, its content says, not its name. Nothing is subtracted, clipped, scaled or rotated; the frame is the
 //! visible area, with the mosaic's phase and the levels counted from its top left.
 
+mod bits;
 mod camera;
 mod demosaic;
 mod dng;
 mod error;
 mod frame;
 mod hint;
+mod ljpeg;
 mod metadata;
 mod nef;
 mod nikon_bits;

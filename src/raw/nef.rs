@@ -5,8 +5,9 @@
 //! row is two interleaved sequences (even and odd columns), each predicted from two samples to the left, at the row's start
 //! from two rows above; the differences are Huffman-coded, and a curve maps the result to raw numbers.
 
+use super::bits::Bits;
 use super::error::CONVERT_TO_DNG;
-use super::nikon_bits::{Differences, Tree};
+use super::nikon_bits::Tree;
 use super::sensor::{self, Area, Stored};
 use super::tags::{Block, Directory, Tiff, tag};
 use super::unpack::Storage;
@@ -220,7 +221,7 @@ fn decode_rows(
     width: usize,
     image: &mut [u16],
 ) -> Result<(), DecodeError> {
-    let mut differences = Differences::new(packed);
+    let mut bits = Bits::new(packed);
     let mut above = coding.start;
     let (split_row, split_tree) = match &coding.split {
         Some((row, tree)) => (*row, tree),
@@ -229,9 +230,8 @@ fn decode_rows(
     for (y, row) in image.chunks_exact_mut(width).enumerate() {
         let (tree, slack) =
             if y < split_row { (&coding.tree, 0) } else { (split_tree, SPLIT_SLACK) };
-        let inside =
-            decode_row(&mut differences, tree, &coding.curve, slack, &mut above[y % 2], row);
-        if !inside || differences.overrun() {
+        let inside = decode_row(&mut bits, tree, &coding.curve, slack, &mut above[y % 2], row);
+        if !inside || bits.overrun() {
             return Err(DecodeError::damaged(format!("its compressed data goes wrong in row {y}")));
         }
     }
@@ -241,7 +241,7 @@ fn decode_rows(
 /// One row; `above` holds the first two values of the row two above and becomes this row's. Returns whether all values
 /// lay on the curve.
 fn decode_row(
-    differences: &mut Differences,
+    bits: &mut Bits,
     tree: &Tree,
     curve: &[u16],
     slack: i32,
@@ -254,7 +254,7 @@ fn decode_row(
     for (x, pair) in row.chunks_mut(2).enumerate() {
         for (value, sample) in left.iter_mut().zip(pair) {
             // Differences have 16 bits at most, so a row cannot overflow i32 unless it is wrong anyway.
-            *value = value.wrapping_add(differences.next(tree));
+            *value = value.wrapping_add(tree.next(bits));
             (lowest, highest) = (lowest.min(*value), highest.max(*value));
             *sample = curve[(*value).clamp(0, last) as usize];
         }

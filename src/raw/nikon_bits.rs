@@ -1,5 +1,7 @@
 //! The Huffman code of Nikon's compressed NEF.
 
+use super::bits::Bits;
+
 /// Longest code of any of the trees, bits.
 const LONGEST_CODE: u32 = 11;
 
@@ -75,98 +77,43 @@ impl Tree {
 
     fn fast_entry(&self, bits: u32) -> (i16, u8) {
         let padded = (bits << (32 - FAST)).to_be_bytes();
-        let mut differences = Differences::new(&padded);
-        differences.fill();
-        let before = differences.held;
-        let difference = differences.next_by_code(self);
-        match (before - differences.held, i16::try_from(difference)) {
-            (length, Ok(difference)) if length <= FAST => (difference, length as u8),
+        let mut reader = Bits::new(&padded);
+        let difference = self.next_by_code(&mut reader);
+        match (reader.position(), i16::try_from(difference)) {
+            (length, Ok(difference)) if length <= FAST as usize => (difference, length as u8),
             _ => (0, 0),
         }
     }
 }
 
-/// Reads differences from a stream of bits, most significant first.
-#[derive(Debug)]
-pub(crate) struct Differences<'a> {
-    bytes: &'a [u8],
-    /// Next byte to load; counts on beyond the end, where zeros follow.
-    next: usize,
-    /// Loaded bits, from the top.
-    buffer: u64,
-    /// How many of them are loaded.
-    held: u32,
-}
-
-impl<'a> Differences<'a> {
-    pub(crate) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, next: 0, buffer: 0, held: 0 }
-    }
-
-    /// True when bits beyond the end have been used.
-    pub(crate) fn overrun(&self) -> bool {
-        self.next * 8 > self.bytes.len() * 8 + self.held as usize
-    }
-
-    /// At least 56 bits are held afterwards.
-    #[inline]
-    fn fill(&mut self) {
-        match self.bytes.get(self.next..).and_then(<[u8]>::first_chunk) {
-            Some(&eight) => {
-                self.buffer |= u64::from_be_bytes(eight) >> self.held;
-                self.next += (63 - self.held as usize) / 8;
-                self.held |= 56;
-            }
-            None => self.fill_near_end(),
-        }
-    }
-
-    #[cold]
-    fn fill_near_end(&mut self) {
-        while self.held <= 56 {
-            let byte = self.bytes.get(self.next).copied().unwrap_or(0);
-            self.buffer |= u64::from(byte) << (56 - self.held);
-            self.next += 1;
-            self.held += 8;
-        }
-    }
-
-    #[inline]
-    fn skip(&mut self, bits: u32) {
-        self.buffer <<= bits;
-        self.held -= bits;
-    }
-
+impl Tree {
     /// The next difference.
-    #[inline(always)]
-    pub(crate) fn next(&mut self, tree: &Tree) -> i32 {
-        if self.held < 32 {
-            self.fill();
-        }
-        match tree.fast[(self.buffer >> (64 - FAST)) as usize] {
-            (_, 0) => self.next_by_code(tree),
+    #[inline]
+    pub(crate) fn next(&self, bits: &mut Bits) -> i32 {
+        bits.fill();
+        match self.fast[bits.peek(FAST) as usize] {
+            (_, 0) => self.next_by_code(bits),
             (difference, length) => {
-                self.skip(length.into());
+                bits.skip(length.into());
                 difference.into()
             }
         }
     }
 
-    /// The next difference, by its code and its bits; 32 bits must be held.
-    fn next_by_code(&mut self, tree: &Tree) -> i32 {
-        let [code_length, symbol] = tree.table[(self.buffer >> (64 - LONGEST_CODE)) as usize];
-        self.skip(code_length.into());
+    /// The next difference, by its code and its bits.
+    fn next_by_code(&self, bits: &mut Bits) -> i32 {
+        bits.fill();
+        let [code_length, symbol] = self.table[bits.peek(LONGEST_CODE) as usize];
+        bits.skip(code_length.into());
         let (length, omitted) = (u32::from(symbol & 15), u32::from(symbol >> 4));
         if length == 0 {
             return 0;
         }
-        let stored = length - omitted;
-        // Twice shifted: `stored` may be 0, and no shift may reach 64.
-        let bits = ((self.buffer >> 1) >> (63 - stored)) as i32;
-        self.skip(stored);
+        let stored = bits.peek(length - omitted).cast_signed();
+        bits.skip(length - omitted);
         // Omitted bits read as one half: 1 followed by zeros.
-        let magnitude = (((bits << 1) | 1) << omitted) >> 1;
-        if magnitude >> (length - 1) & 1 == 1 {
+        let magnitude = (((stored << 1) | 1) << omitted) >> 1;
+        if (magnitude >> (length - 1)) & 1 == 1 {
             magnitude
         } else {
             magnitude - (1 << length) + i32::from(omitted == 0)
@@ -197,10 +144,10 @@ mod tests {
             .chunks(8)
             .map(|eight| (0..8).fold(0, |byte, i| byte << 1 | eight.get(i).copied().unwrap_or(0)))
             .collect();
-        let mut differences = Differences::new(&bytes);
-        let found: Vec<i32> = expected.iter().map(|_| differences.next(tree)).collect();
+        let mut reader = Bits::new(&bytes);
+        let found: Vec<i32> = expected.iter().map(|_| tree.next(&mut reader)).collect();
         assert_eq!(found, expected);
-        assert!(!differences.overrun());
+        assert!(!reader.overrun());
     }
 
     #[test]
@@ -227,12 +174,10 @@ mod tests {
         let bytes: Vec<u8> = (0..4000).flat_map(|i| mix(i).to_le_bytes()).collect();
         for bits in [12, 14] {
             for tree in [Tree::lossless(bits), Tree::lossy(bits), Tree::lossy_after_split(bits)] {
-                let (mut fast, mut plain) = (Differences::new(&bytes), Differences::new(&bytes));
+                let (mut fast, mut plain) = (Bits::new(&bytes), Bits::new(&bytes));
                 while !fast.overrun() {
-                    if plain.held < 32 {
-                        plain.fill();
-                    }
-                    assert_eq!(fast.next(&tree), plain.next_by_code(&tree));
+                    assert_eq!(tree.next(&mut fast), tree.next_by_code(&mut plain));
+                    assert_eq!(fast.position(), plain.position());
                 }
                 assert!(plain.overrun());
             }
@@ -241,8 +186,8 @@ mod tests {
 
     #[test]
     fn the_end_is_noticed() {
-        let mut differences = Differences::new(&[0b0010_0000]);
-        differences.next(&Tree::lossless(14));
-        assert!(differences.overrun());
+        let mut reader = Bits::new(&[0b0010_0000]);
+        Tree::lossless(14).next(&mut reader);
+        assert!(reader.overrun());
     }
 }

@@ -1,8 +1,9 @@
-//! Samples out of the strips or tiles of a TIFF directory: uncompressed at 8 to 16 bits, or deflated.
+//! Samples out of the strips or tiles of a TIFF directory: uncompressed at 8 to 16 bits, deflated,
+//! or lossless JPEG.
 
-use super::DecodeError;
 use super::error::CONVERT_TO_DNG;
 use super::tags::{Directory, Order, Tiff, tag};
+use super::{DecodeError, ljpeg};
 use crate::raster::limits;
 use std::borrow::Cow;
 use std::io::Read;
@@ -102,6 +103,7 @@ impl Storage {
         let Self { compression, bits, predictor, .. } = *self;
         let known = match compression {
             1 => (8..=16).contains(&bits) && predictor == 1,
+            7 => (8..=16).contains(&bits),
             8 | 32946 => matches!(bits, 8 | 16) && matches!(predictor, 1 | 2),
             _ => false,
         };
@@ -147,21 +149,29 @@ impl Storage {
         row: &mut [u16],
     ) -> Result<(), DecodeError> {
         let rows = self.segment[1].min(self.height - line * self.segment[1]);
+        let stride = self.width * self.samples_per_pixel;
+        let first = column * row.len();
+        let kept = row.len().min(stride - first);
+        let start = |y: usize| (line * self.segment[1] + y) * stride + first;
+        if self.compression == 7 {
+            let counts = [row.len() * self.segment[1], row.len() * rows];
+            let values = ljpeg::decode(self.bytes_of(tiff, place, place[1])?, counts)?;
+            for (y, values) in values.chunks_exact(row.len()).take(rows).enumerate() {
+                samples[start(y)..start(y) + kept].copy_from_slice(&values[..kept]);
+            }
+            return Ok(());
+        }
         let row_bytes = (row.len() * self.bits as usize).div_ceil(8);
         let bytes = match self.compression {
             1 => Cow::Borrowed(self.bytes_of(tiff, place, rows * row_bytes)?),
             _ => Cow::Owned(inflate(self.bytes_of(tiff, place, place[1])?, rows * row_bytes)?),
         };
-        let stride = self.width * self.samples_per_pixel;
-        let first = column * row.len();
-        let kept = row.len().min(stride - first);
         for (y, packed) in bytes.chunks_exact(row_bytes).enumerate() {
             unpack_row(packed, self.bits, tiff.block.order, row);
             if self.predictor == 2 {
                 undo_differences(row, self.samples_per_pixel, self.bits);
             }
-            let start = (line * self.segment[1] + y) * stride + first;
-            samples[start..start + kept].copy_from_slice(&row[..kept]);
+            samples[start(y)..start(y) + kept].copy_from_slice(&row[..kept]);
         }
         Ok(())
     }
@@ -243,9 +253,12 @@ fn undo_differences(row: &mut [u16], channels: usize, bits: u32) {
 
 /// Exactly `length` bytes out of a zlib stream.
 fn inflate(packed: &[u8], length: usize) -> Result<Vec<u8>, DecodeError> {
+    let damaged = || DecodeError::damaged("a deflated strip does not unpack");
+    // RFC 1951: one byte stands for at most 1032.
+    if length > packed.len().saturating_mul(1032) {
+        return Err(damaged());
+    }
     let mut bytes = vec![0; length];
-    flate2::read::ZlibDecoder::new(packed)
-        .read_exact(&mut bytes)
-        .map_err(|_| DecodeError::damaged("a deflated strip does not unpack"))?;
+    flate2::read::ZlibDecoder::new(packed).read_exact(&mut bytes).map_err(|_| damaged())?;
     Ok(bytes)
 }

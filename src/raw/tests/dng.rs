@@ -64,7 +64,7 @@ fn segment(all: &[u16], kind: Kind, x0: usize, y0: usize) -> Vec<u8> {
     if kind.compression == 7 {
         // Cameras call two neighbours the components of one column.
         let components = if width % 2 == 0 { 2 } else { 1 };
-        return ljpeg::encode(&values, width / components, components, kind.bits as u8);
+        return ljpeg::encode(&values, width / components, components, kind.bits as u8, 1);
     }
     if kind.compression == 1 {
         return bytes;
@@ -158,6 +158,17 @@ fn every_storage_gives_the_same_samples() {
             }
             for (bits, predictor) in [(16, 1), (16, 2), (8, 2)] {
                 check_samples(Kind { order, bits, segment, compression: 8, predictor });
+            }
+        }
+    }
+}
+
+#[test]
+fn lossless_jpeg_gives_the_same_samples() {
+    for order in [Order::Little, Order::Big] {
+        for segment in [[WIDTH, HEIGHT], [WIDTH, 5], [16, 16], [48, 32], [15, 9]] {
+            for bits in [8, 12, 14, 16] {
+                check_samples(Kind { order, bits, segment, compression: 7, predictor: 1 });
             }
         }
     }

@@ -21,6 +21,10 @@ fn seeds() -> Vec<Vec<u8>> {
         dng::Kind { compression: 8, predictor: 2, segment: [37, 5], ..plain },
         vec![],
     ));
+    seeds.push(dng::file(
+        dng::Kind { compression: 7, bits: 14, segment: [16, 16], ..plain },
+        vec![],
+    ));
     seeds.extend(nef::KINDS.iter().map(|&kind| nef::file(kind, 1).0));
     let grey = image::ImageBuffer::from_fn(33, 17, |x, y| image::Luma([(x * y * 100) as u16]));
     let rgb =
