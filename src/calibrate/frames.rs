@@ -55,6 +55,10 @@ impl Levels {
         Self { black, saturation: stated, response: color.response.clone() }
     }
 
+    pub(super) fn from_parts(black: [f64; 4], saturation: [f64; 4], response: Vec<f64>) -> Self {
+        Self { black, saturation, response }
+    }
+
     pub(super) fn range(&self, place: usize) -> f64 {
         let range = self.saturation[place] - self.black[place];
         if range.is_finite() { range } else { 1.0 }

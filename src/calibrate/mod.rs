@@ -5,13 +5,16 @@
 
 mod boards;
 mod camera;
+mod color;
 mod error;
 mod frames;
 mod lights;
 mod moved;
+mod patches;
 mod sheet;
 
 pub use camera::{BoardReport, CameraOptions, CameraReport, camera};
+pub use color::{ColorOptions, ColorReport, color};
 pub use error::CalibrateError;
 pub use lights::{LightReport, LightsOptions, LightsReport, SheetReport, lights};
 

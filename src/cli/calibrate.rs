@@ -2,7 +2,7 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
-use crate::calibrate::{self, CameraOptions, LightsOptions};
+use crate::calibrate::{self, CameraOptions, ColorOptions, LightsOptions};
 use clap::Subcommand;
 use serde::Serialize;
 use std::fmt::Write;
@@ -41,6 +41,21 @@ enum What {
         #[arg(long, value_name = "CALIB")]
         out: PathBuf,
     },
+    /// Black level, response, noise, white balance and colour from a grey or colour chart
+    #[command(
+        after_help = "Example:\n  weavelight calibrate color --rig rig.toml grey --out calibration"
+    )]
+    Color {
+        /// The rig's description
+        #[arg(long, value_name = "rig.toml")]
+        rig: PathBuf,
+        /// Grey capture session
+        #[arg(value_name = "GREY_SESSION")]
+        session: PathBuf,
+        /// Calibration folder to add to
+        #[arg(long, value_name = "CALIB")]
+        out: PathBuf,
+    },
     /// Every LED's position, beam and strength from white sheets
     ///
     /// One flat sheet gives strengths and gain maps and keeps the ruler's positions; sheets flat, raised by 100 mm and tilted
@@ -71,6 +86,12 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
             let report = calibrate::camera(&options, &progress).map_err(Failure::work)?;
             Ok(output(camera_text(&report), &report, &report.warnings))
         }
+        What::Color { rig, session, out } => {
+            let options =
+                ColorOptions { rig: rig.clone(), session: session.clone(), out: out.clone() };
+            let report = calibrate::color(&options, &progress).map_err(Failure::work)?;
+            Ok(output(color_text(&report), &report, &report.warnings))
+        }
         What::Lights { rig, sessions, out } => {
             let options =
                 LightsOptions { rig: rig.clone(), sessions: sessions.clone(), out: out.clone() };
@@ -100,6 +121,36 @@ fn camera_text(report: &calibrate::CameraReport) -> String {
     }
     for board in report.boards.iter().filter(|board| board.dropped.is_none()) {
         let _ = writeln!(text, "{}: {:.3} px", board.file, board.rms_px.unwrap_or(f64::NAN));
+    }
+    text
+}
+
+fn color_text(report: &calibrate::ColorReport) -> String {
+    let mut text = format!(
+        "black {:.2?} ({}), saturation {:.0}\n",
+        report.black_level, report.black_from, report.saturation_level
+    );
+    if let Some(nonlinearity) = report.nonlinearity {
+        let _ = writeln!(
+            text,
+            "nonlinearity {:.3} %, response {:?}",
+            100.0 * nonlinearity,
+            report.response
+        );
+    }
+    if let (Some(gain), Some(read)) = (report.electrons_per_dn, report.read_noise_e) {
+        let _ =
+            writeln!(text, "{gain:.3} electrons per raw number, read noise {read:.2} electrons");
+    }
+    let _ = writeln!(text, "{} hot and {} dead photosites", report.hot, report.dead);
+    if let Some(from) = report.matrix_from {
+        let _ = writeln!(text, "colour matrix from {from}");
+    }
+    for (k, [before, after]) in report.patches_de2000.iter().enumerate() {
+        let _ = writeln!(
+            text,
+            "colour patch {k}: CIEDE2000 {before:.2} without the matrix, {after:.2} with it"
+        );
     }
     text
 }
