@@ -12,6 +12,8 @@ const SEARCH_WIDTH_PX: usize = 1500;
 /// Half the window of the refinement, as a share of the distance between corners, and its bounds in pixels.
 const WINDOW_SHARE: f64 = 0.25;
 const WINDOW_PX: (f64, f64) = (3.0, 40.0);
+/// Half the window of the lesser refinement in large pictures, in pixels of the searched picture.
+const SMALL_WINDOW_PX: f64 = 4.0;
 /// Largest plausible distance between the searched and the refined corner, in pixels of the searched picture.
 const REFINE_REACH_PX: f64 = 1.5;
 
@@ -24,16 +26,25 @@ pub enum Detector {
     Classic,
 }
 
+/// The corners of one board, found in two ways. Which is better depends on lens, light and sensor: calibrate with both and
+/// keep what fits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// As the detector placed them (in large pictures: refined with a small window).
+    pub detected: BoardView,
+    /// Sub-pixel refined over a window as large as the squares allow; many edge pixels average noise out.
+    pub refined: BoardView,
+    /// Which detector found the board.
+    pub detector: Detector,
+}
+
 /// Finds the board; `None` where there is no complete one.
 ///
 /// `grey`: any scale; sensor pixels, (0, 0) is the centre of the first.
 ///
 /// # Errors
 /// Where OpenCV fails.
-pub fn detect(
-    grey: &Image<f32>,
-    shape: &BoardShape,
-) -> Result<Option<(BoardView, Detector)>, BoardError> {
+pub fn detect(grey: &Image<f32>, shape: &BoardShape) -> Result<Option<Found>, BoardError> {
     find(grey, shape).map_err(failed)
 }
 
@@ -41,16 +52,29 @@ fn failed(error: opencv::Error) -> BoardError {
     BoardError::Failed { what: error.message }
 }
 
-fn find(grey: &Image<f32>, shape: &BoardShape) -> opencv::Result<Option<(BoardView, Detector)>> {
+fn find(grey: &Image<f32>, shape: &BoardShape) -> opencv::Result<Option<Found>> {
     let factor = grey.width.div_ceil(SEARCH_WIDTH_PX).max(1);
     let small = reduced(grey, factor);
     let bytes = eight_bit(&small);
     let searched = Mat::from_slice(&bytes)?;
     let searched = searched.reshape(1, small.height as i32)?;
     let Some((corners, detector)) = search(&searched, shape)? else { return Ok(None) };
-    let places: Vec<[f64; 2]> = corners.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect();
-    let refined = if factor == 1 { Some(places) } else { refine(grey, shape, &places, factor)? };
-    Ok(refined.map(|corners| (BoardView { corners_px: shape.upright(&corners) }, detector)))
+    let scale = factor as f64;
+    let full = |c: f32| (f64::from(c) + 0.5) * scale - 0.5;
+    let start: Vec<[f64; 2]> = corners.iter().map(|p| [full(p.x), full(p.y)]).collect();
+    let reach_px = REFINE_REACH_PX * scale;
+    let Some(refined) = refine(grey, &start, window_px(shape, &start), reach_px)? else {
+        return Ok(None);
+    };
+    let small_window = (SMALL_WINDOW_PX * scale) as i32;
+    let detected =
+        if factor == 1 { Some(start) } else { refine(grey, &start, small_window, reach_px)? };
+    let view = |corners: &[[f64; 2]]| BoardView { corners_px: shape.upright(corners) };
+    Ok(detected.map(|detected| Found {
+        detected: view(&detected),
+        refined: view(&refined),
+        detector,
+    }))
 }
 
 fn search(
@@ -74,25 +98,21 @@ fn search(
     Ok(Some((corners, Detector::Classic)))
 }
 
-/// Corners of the reduced picture, sharpened on the full one; `None` where they run away.
+/// Corners sharpened on the full picture; `None` where they run away.
 fn refine(
     grey: &Image<f32>,
-    shape: &BoardShape,
-    corners: &[[f64; 2]],
-    factor: usize,
+    start: &[[f64; 2]],
+    window: i32,
+    reach_px: f64,
 ) -> opencv::Result<Option<Vec<[f64; 2]>>> {
-    let scale = factor as f64;
-    let full = |c: f64| (c + 0.5) * scale - 0.5;
-    let start: Vec<[f64; 2]> = corners.iter().map(|c| c.map(full)).collect();
     let mut places: Vector<Point2f> =
         start.iter().map(|[u, v]| Point2f::new(*u as f32, *v as f32)).collect();
     let picture = Mat::from_slice(&grey.data)?;
     let picture = picture.reshape(1, grey.height as i32)?;
-    sub_pixel(&picture, &mut places, window_px(shape, &start))?;
+    sub_pixel(&picture, &mut places, window)?;
     let refined: Vec<[f64; 2]> = places.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect();
-    let strayed =
-        |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]) > REFINE_REACH_PX * scale;
-    Ok((!refined.iter().zip(&start).any(strayed)).then_some(refined))
+    let strayed = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]) > reach_px;
+    Ok((!refined.iter().zip(start).any(strayed)).then_some(refined))
 }
 
 fn sub_pixel(
@@ -133,7 +153,7 @@ fn reduced(grey: &Image<f32>, factor: usize) -> Image<f32> {
     out
 }
 
-/// Stretches the middle 98 % of the values to 8 bits.
+/// Stretches the middle 98 % of the values to 8 bits, by their square root: noise is then alike in dark and bright squares.
 fn eight_bit(grey: &Image<f32>) -> Vec<u8> {
     let mut sample: Vec<f32> =
         grey.data.iter().step_by(7).copied().filter(|v| v.is_finite()).collect();
@@ -141,8 +161,8 @@ fn eight_bit(grey: &Image<f32>) -> Vec<u8> {
     let at =
         |share: f64| sample.get((share * sample.len() as f64) as usize).copied().unwrap_or(0.0);
     let (low, high) = (at(0.01), at(0.99));
-    let scale = 255.0 / (high - low).max(f32::MIN_POSITIVE);
-    grey.data.iter().map(|v| ((v - low) * scale).clamp(0.0, 255.0) as u8).collect()
+    let scale = (high - low).max(f32::MIN_POSITIVE).recip();
+    grey.data.iter().map(|v| (255.0 * ((v - low) * scale).clamp(0.0, 1.0).sqrt()) as u8).collect()
 }
 
 /// Camera, lens and poses from views of one board: Zhang's method and Levenberg-Marquardt as OpenCV does it, with the

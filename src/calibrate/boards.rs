@@ -11,6 +11,15 @@ pub(super) fn shape_of(board: &Board) -> BoardShape {
     BoardShape { columns: board.columns, rows: board.rows, square_mm: board.square_mm }
 }
 
+/// The corners of one board, found in two ways; the camera is fitted to whichever set fits better.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Corners {
+    /// As the detector placed them.
+    pub(super) detected: BoardView,
+    /// Refined over windows as large as the squares allow.
+    pub(super) refined: BoardView,
+}
+
 /// A fit, the numbers of the views kept, and the views dropped.
 pub(super) type Fitted = (CameraFit, Vec<usize>, Vec<Dropped>);
 
@@ -23,20 +32,31 @@ mod with_opencv {
     pub(in crate::calibrate) fn detect(
         grey: &Image<f32>,
         shape: &BoardShape,
-    ) -> Result<Option<BoardView>, CalibrateError> {
-        Ok(chessboard::detect(grey, shape)?.map(|(view, _)| view))
+    ) -> Result<Option<Corners>, CalibrateError> {
+        let found = chessboard::detect(grey, shape)?;
+        Ok(found.map(|found| Corners { detected: found.detected, refined: found.refined }))
     }
 
     pub(in crate::calibrate) fn fit(
-        views: &[BoardView],
+        boards: &[Corners],
         shape: &BoardShape,
         size_px: [usize; 2],
     ) -> Result<Fitted, CalibrateError> {
-        let fit = |kept: &[usize]| {
-            let views: Vec<&BoardView> = kept.iter().map(|k| &views[*k]).collect();
-            chessboard::calibrate(&views, shape, size_px)
+        let with = |view: &dyn Fn(&Corners) -> BoardView| {
+            let views: Vec<BoardView> = boards.iter().map(view).collect();
+            let fit = |kept: &[usize]| {
+                let views: Vec<&BoardView> = kept.iter().map(|k| &views[*k]).collect();
+                chessboard::calibrate(&views, shape, size_px)
+            };
+            fit_without_outliers(views.len(), &fit)
         };
-        Ok(fit_without_outliers(views.len(), &fit)?)
+        let detected = with(&|corners| corners.detected.clone());
+        let refined = with(&|corners| corners.refined.clone());
+        match (detected, refined) {
+            (Ok(detected), Ok(refined)) if detected.0.rms_px < refined.0.rms_px => Ok(detected),
+            (Ok(detected), Err(_)) => Ok(detected),
+            (_, refined) => Ok(refined?),
+        }
     }
 
     pub(in crate::calibrate) fn pose(
@@ -55,12 +75,12 @@ mod without_opencv {
     pub(in crate::calibrate) fn detect(
         _grey: &Image<f32>,
         _shape: &BoardShape,
-    ) -> Result<Option<BoardView>, CalibrateError> {
+    ) -> Result<Option<Corners>, CalibrateError> {
         Err(CalibrateError::NoChessboards)
     }
 
     pub(in crate::calibrate) fn fit(
-        _views: &[BoardView],
+        _boards: &[Corners],
         _shape: &BoardShape,
         _size_px: [usize; 2],
     ) -> Result<Fitted, CalibrateError> {

@@ -1,6 +1,6 @@
 //! `calibrate camera`: intrinsics, distortion and the table's pose from pictures of a chessboard.
 
-use super::boards::{self, shape_of};
+use super::boards::{self, Corners, shape_of};
 use super::frames::{check_size, grey_picture, read_frame};
 use super::{CalibrateError, Inputs, Progress};
 use crate::files::Provenance;
@@ -96,9 +96,9 @@ pub fn camera(
     if found.iter().all(Option::is_none) {
         return Err(none_found(&pictures, &shape));
     }
-    let table = table_picture(&sessions, &pictures);
+    let table = table_picture(&pictures);
     let used: Vec<usize> = (0..pictures.len()).filter(|k| found[*k].is_some()).collect();
-    let views: Vec<BoardView> = found.iter().flatten().cloned().collect();
+    let views: Vec<Corners> = found.iter().flatten().cloned().collect();
     progress(0.8, "fitting the camera");
     let (fit, kept, dropped) = boards::fit(&views, &shape, size)?;
     let pictures_kept: Vec<usize> = kept.iter().map(|view| used[*view]).collect();
@@ -120,7 +120,7 @@ pub fn camera(
         boards[used[outlier.view]] =
             outlier_report(&pictures[used[outlier.view]], outlier.rms_px, outlier.typical_px);
     }
-    let kept_views: Vec<BoardView> = kept.iter().map(|view| views[*view].clone()).collect();
+    let kept_views: Vec<BoardView> = kept.iter().map(|view| views[*view].refined.clone()).collect();
     let mut report = CameraReport {
         intrinsics_px: fit.intrinsics,
         distortion: fit.distortion,
@@ -180,7 +180,7 @@ fn find_all(
     rig: &Path,
     size: [usize; 2],
     progress: &Progress,
-) -> Result<Vec<Option<BoardView>>, CalibrateError> {
+) -> Result<Vec<Option<Corners>>, CalibrateError> {
     let done = std::sync::atomic::AtomicUsize::new(0);
     pictures
         .par_iter()
@@ -224,8 +224,7 @@ fn other_size(picture: &Picture, shape: &BoardShape) -> Option<[usize; 2]> {
 }
 
 /// The frame with `pose = "table"`, else the first one listed.
-fn table_picture(sessions: &[Session], pictures: &[Picture]) -> usize {
-    let _ = sessions;
+fn table_picture(pictures: &[Picture]) -> usize {
     pictures.iter().position(|p| p.entry.pose.as_deref() == Some("table")).unwrap_or(0)
 }
 

@@ -411,12 +411,8 @@ fn color_patches(
         })
     });
     let colored = chart.patches.iter().zip(&values).filter_map(|(patch, value)| {
-        let camera = value.map(|v| v * reflectance / light);
-        Some(ColorPatch {
-            camera: [camera?[0], camera?[1], camera?[2]],
-            lab_d50: patch.lab_d50?,
-            place: place(patch).1,
-        })
+        let camera = value.map(|value| value.map(|v| v * reflectance / light))?;
+        Some(ColorPatch { camera, lab_d50: patch.lab_d50?, place: place(patch).1 })
     });
     colored.collect()
 }

@@ -174,7 +174,7 @@ fn average(
         exposure: seconds_at_iso_100(entry),
         cells: rects.iter().map(|rect| mean_in(&frame, &levels, *rect)).collect(),
         pattern: Pattern::of(&frame),
-        board: board.flatten(),
+        board: board.flatten().map(|corners| corners.refined),
     })
 }
 

@@ -6,6 +6,7 @@ mod fit;
 mod gain;
 mod joint;
 mod observation;
+mod plan;
 mod system;
 mod uncertainty;
 mod wiring;
@@ -17,6 +18,7 @@ pub use joint::Prior;
 #[cfg(test)]
 use joint::median;
 pub use observation::{Cell, PoseSigma, Sample, Sheet};
+pub use plan::{PLAN_CELLS, Plan};
 pub use wiring::{Mismatch, mismatches};
 
 #[cfg(test)]
