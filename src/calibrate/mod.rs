@@ -5,6 +5,7 @@
 
 mod boards;
 mod camera;
+mod check;
 mod color;
 mod error;
 mod frames;
@@ -12,11 +13,14 @@ mod lights;
 mod moved;
 mod patches;
 mod sheet;
+mod status;
 
 pub use camera::{BoardReport, CameraOptions, CameraReport, camera};
+pub use check::{CheckOptions, CheckReport, CheckedSheet, check};
 pub use color::{ColorOptions, ColorReport, color};
 pub use error::CalibrateError;
 pub use lights::{LightReport, LightsOptions, LightsReport, SheetReport, lights};
+pub use status::{Status, Step, StepState, status};
 
 use crate::files::{FileError, Input, sha256_of_file};
 use crate::session::Session;

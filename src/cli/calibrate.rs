@@ -1,8 +1,8 @@
 //! `weavelight calibrate`
 
-use super::output::{Failure, Output};
+use super::output::{Failure, Output, WORK_FAILED};
 use super::progress::Progress;
-use crate::calibrate::{self, CameraOptions, ColorOptions, LightsOptions};
+use crate::calibrate::{self, CameraOptions, CheckOptions, ColorOptions, LightsOptions, StepState};
 use clap::Subcommand;
 use serde::Serialize;
 use std::fmt::Write;
@@ -74,6 +74,33 @@ enum What {
         #[arg(long, value_name = "CALIB")]
         out: PathBuf,
     },
+    /// What there is, how good it is, and what to photograph next
+    #[command(after_help = "Example:\n  weavelight calibrate status calibration")]
+    Status {
+        /// Calibration folder
+        #[arg(value_name = "CALIB")]
+        calibration: PathBuf,
+    },
+    /// Solve white sheets that the fit has not seen, flat and tilted
+    ///
+    /// Exit status 1 where a sheet's slope error exceeds the threshold.
+    #[command(
+        after_help = "Example:\n  weavelight calibrate check calibration white-tilt-4 --out residuals"
+    )]
+    Check {
+        /// Calibration folder
+        #[arg(value_name = "CALIB")]
+        calibration: PathBuf,
+        /// White capture sessions
+        #[arg(value_name = "WHITE_SESSION", required = true)]
+        sessions: Vec<PathBuf>,
+        /// Largest RMS slope error over a sheet that passes
+        #[arg(long, value_name = "DEG", default_value_t = 0.1)]
+        threshold_deg: f64,
+        /// Folder for the residual maps
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
@@ -97,6 +124,21 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
                 LightsOptions { rig: rig.clone(), sessions: sessions.clone(), out: out.clone() };
             let report = calibrate::lights(&options, &progress).map_err(Failure::work)?;
             Ok(output(lights_text(&report), &report, &report.warnings))
+        }
+        What::Status { calibration } => {
+            let status = calibrate::status(calibration).map_err(Failure::work)?;
+            Ok(output(status_text(&status), &status, &[]))
+        }
+        What::Check { calibration, sessions, threshold_deg, out } => {
+            let options = CheckOptions {
+                calibration: calibration.clone(),
+                sessions: sessions.clone(),
+                threshold_deg: *threshold_deg,
+                out: out.clone(),
+            };
+            let report = calibrate::check(&options, &progress).map_err(Failure::work)?;
+            let status = if report.passed { 0 } else { WORK_FAILED };
+            Ok(Output { status, ..output(check_text(&report), &report, &report.warnings) })
         }
     }
 }
@@ -175,6 +217,58 @@ fn lights_text(report: &calibrate::LightsReport) -> String {
             ),
             _ => writeln!(text, "light {i}: directional"),
         };
+    }
+    text
+}
+
+fn status_text(status: &calibrate::Status) -> String {
+    let mut text = String::new();
+    for step in &status.steps {
+        let state = match step.state {
+            StepState::Missing => "missing",
+            StepState::Improvable => "can be better",
+            StepState::Good => "good",
+        };
+        let created =
+            step.created.as_deref().map_or(String::new(), |created| format!(", made {created}"));
+        let _ = writeln!(text, "{}: {state}; {}{created}", step.name, step.quality);
+    }
+    let foreseen = status
+        .next_sigma_mm
+        .map_or(String::new(), |sigma| format!(" (position error then about {sigma:.2} mm)"));
+    let _ = writeln!(text, "next: {}{foreseen}", status.next);
+    text
+}
+
+fn check_text(report: &calibrate::CheckReport) -> String {
+    let verdict = if report.passed { "passed" } else { "failed" };
+    let mut text = format!("{verdict}: slope error at most {} degrees RMS\n", report.threshold_deg);
+    for sheet in &report.sheets {
+        let _ = writeln!(
+            text,
+            "{} ({:.1} degrees): slope error {:.3} degrees RMS, {:.3} at 95 %, {:.3} at most; albedo {:.4} +- {:.4}; condition {:.1} to {:.1}",
+            sheet.name,
+            sheet.tilt_deg,
+            sheet.slope_rms_deg,
+            sheet.slope_p95_deg,
+            sheet.slope_max_deg,
+            sheet.albedo[0],
+            sheet.albedo[1],
+            sheet.condition[0],
+            sheet.condition[1]
+        );
+        for (i, residual) in sheet.residual_rms.iter().enumerate() {
+            let _ = write!(
+                text,
+                "{}light {i} {:.2} %",
+                if i == 0 { "  residuals: " } else { ", " },
+                100.0 * residual
+            );
+        }
+        text.push('\n');
+        if let Some(map) = &sheet.residual_map {
+            let _ = writeln!(text, "  {}", map.display());
+        }
     }
     text
 }
