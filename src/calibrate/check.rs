@@ -91,7 +91,7 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
     for (k, path) in options.sessions.iter().enumerate() {
         let session = Session::load(path)?;
         let part = |share: f64, what: &str| {
-            progress((k as f64 + share) / options.sessions.len() as f64, what)
+            progress((k as f64 + share) / options.sessions.len() as f64, what);
         };
         let observed = observe(&session, calibration.lights.len(), &camera, color, &part)?;
         report.warnings.extend(observed.warnings);
@@ -136,7 +136,7 @@ fn solve_sheet(
             let intensity = light.light.intensity();
             let signal =
                 (0..3).map(|k| sample.signal[k] / (intensity[k] * gain[k])).sum::<f64>() / 3.0;
-            let usable = sample.is_usable().then_some(signal).unwrap_or(f64::NAN);
+            let usable = if sample.is_usable() { signal } else { f64::NAN };
             vectors.push(light_vector(&light.light, cell));
             signals.push(usable);
         }

@@ -131,10 +131,10 @@ pub(super) fn mean_in(frame: &Frame, levels: &Levels, rect: Rect) -> Mean {
                     add(cfa.cell[place] as usize, levels.linear(raw_at(frame, x, y, 0), place));
                 }
                 Layout::Grey => {
-                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, 0), place)))
+                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, 0), place)));
                 }
                 Layout::Rgb => {
-                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, c), place)))
+                    (0..3).for_each(|c| add(c, levels.linear(raw_at(frame, x, y, c), place)));
                 }
             }
         }

@@ -125,7 +125,7 @@ pub fn lights(
     let mut sheets: Vec<Sheet> = Vec::new();
     for (k, session) in sessions.iter().enumerate() {
         let part = |share: f64, what: &str| {
-            progress(0.8 * (k as f64 + share) / sessions.len() as f64, what)
+            progress(0.8 * (k as f64 + share) / sessions.len() as f64, what);
         };
         let observed: Observed = observe(session, rig.lights.len(), &camera, &color, &part)?;
         warnings.extend(observed.warnings);

@@ -124,9 +124,9 @@ fn stats(frame: &Frame, patch: &Patch) -> PatchStats {
             }
         }
     }
-    for place in 0..4 {
+    for (place, pairs) in pairs.iter().enumerate() {
         out.mean[place] /= out.count[place];
-        out.variance[place] /= pairs[place];
+        out.variance[place] /= pairs;
     }
     out
 }
