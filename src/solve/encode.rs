@@ -32,7 +32,9 @@ pub(crate) fn write_maps(
             write_png(&path(solution::NORMAL_PNG), &maps.normal, PngContent::Data, encode)
         }),
         Box::new(|| {
-            write_png(&path(solution::ALBEDO_PNG), &maps.albedo, PngContent::Srgb, png_albedo)
+            let table = srgb::Encode16::default();
+            let encode = |rgb: [f32; 3]| rgb.map(|linear| table.encode(linear));
+            write_png(&path(solution::ALBEDO_PNG), &maps.albedo, PngContent::Srgb, encode)
         }),
         Box::new(|| write_png_grey8(&path(solution::MASK_PNG), &maps.mask)),
     ];
@@ -73,11 +75,7 @@ fn png_normal(normal: [f32; 3], normal_y: NormalY) -> [u16; 3] {
     [x, y, z].map(|component| to_u16(component * 0.5 + 0.5))
 }
 
-fn png_albedo(rgb: [f32; 3]) -> [u16; 3] {
-    rgb.map(|linear| to_u16(srgb::encode(linear.clamp(0.0, 1.0))))
-}
-
 fn to_u16(share: f32) -> u16 {
-    // Casting clamps, and turns not-a-number into 0.
-    (share * 65535.0).round() as u16
+    // Casting clamps, and turns not-a-number into 0; rounding by hand, as `round` is a call of its own.
+    (share * 65535.0 + 0.5) as u16
 }
