@@ -4,6 +4,7 @@
 //!
 //! - [`solve_pixel`] and [`reference_row`]: plain float64, the definition of every method
 //! - [`normalise_row`]: raw numbers to input
+//! - [`estimate_noise`]: the noise model where the calibration has none
 //! - [`RowSolver`]: the same answers, fast
 
 #![allow(
@@ -14,6 +15,7 @@
 mod block;
 mod least_squares;
 mod method;
+mod noise;
 mod normal_equations;
 mod normalise;
 mod pieces;
@@ -31,6 +33,7 @@ mod weighted;
 mod tests;
 
 pub use method::{MAX_LIGHTS, Method};
+pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};
 pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
 pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, VarianceModel};

@@ -320,7 +320,8 @@ impl RowOutput<'_> {
     /// Writes one photosite.
     pub(crate) fn write(&mut self, column: usize, pixel: &Pixel) {
         let fit = match pixel {
-            Pixel::Fitted(fit) => fit,
+            Pixel::Fitted(fit) if fit.albedo as f32 > 0.0 => fit,
+            Pixel::Fitted(_) => return self.clear(column, Outcome::NoSurface),
             Pixel::TooFewLights { .. } => return self.clear(column, Outcome::TooFewLights),
             Pixel::CoplanarLights => return self.clear(column, Outcome::CoplanarLights),
             Pixel::NoSurface => return self.clear(column, Outcome::NoSurface),

@@ -85,7 +85,10 @@ impl Surface {
         }
         for k in 0..block.len {
             let column = block.column[k];
-            if !(self.carried[k] && COMFORTABLE.contains(&(length[k] * length[k]))) {
+            let in_range = COMFORTABLE.contains(&(length[k] * length[k]))
+                && (f32::MIN_POSITIVE..f32::MAX).contains(&albedo[k])
+                && residual[k] < f32::MAX;
+            if !(self.carried[k] && in_range) {
                 refused(k, output);
             } else if normal[2][k] > 0.0 {
                 output.normal[column] = [normal[0][k], normal[1][k], normal[2][k]];

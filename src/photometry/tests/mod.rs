@@ -2,4 +2,7 @@
 
 mod accuracy;
 mod agreement;
+mod noise;
+mod real;
 pub(super) mod scene;
+mod stress;

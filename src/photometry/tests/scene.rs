@@ -214,7 +214,7 @@ pub(crate) struct Solved {
 }
 
 impl Solved {
-    fn new(width: usize) -> Self {
+    pub(crate) fn new(width: usize) -> Self {
         Self {
             normal: vec![[f32::NAN; 3]; width],
             albedo: vec![f32::NAN; width],
@@ -225,7 +225,7 @@ impl Solved {
         }
     }
 
-    fn output(&mut self) -> RowOutput<'_> {
+    pub(crate) fn output(&mut self) -> RowOutput<'_> {
         RowOutput {
             normal: &mut self.normal,
             albedo: &mut self.albedo,
