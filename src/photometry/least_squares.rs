@@ -1,6 +1,8 @@
 //! Plain least squares: pseudo-inverse times samples where a photosite has them all, normal equations where some are
 //! missing.
 
+use multiversion::multiversion;
+
 use super::block::{Block, LANES, Lanes, ZERO};
 use super::normal_equations::{Weighting, accumulate, times, variance};
 use super::pieces::{Linear, Piece, Pieces};
@@ -10,7 +12,7 @@ use super::surface::Surface;
 const NORMAL_EQUATIONS_CONDITION_SQUARED: f32 = 1000.0;
 
 /// Photosites of one piece, g = P y; carries those that have all their samples.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn solve_complete(block: &mut Block, pieces: &Pieces, piece: &Piece) -> Surface {
     let offset = block.offset(piece);
     let inverse = &pieces.inverse[piece.first..piece.first + block.sample.len()];
@@ -33,7 +35,7 @@ pub(crate) fn solve_complete(block: &mut Block, pieces: &Pieces, piece: &Piece) 
 }
 
 /// Photosites with samples missing: normal equations over the others, refined once on the residual.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn solve_masked(block: &mut Block) -> Surface {
     let first = accumulate(block, &[ZERO; 3], Weighting::Equal);
     let (inverse, condition_squared) = first.inverse();

@@ -1,5 +1,7 @@
 //! Weighted normal equations of a block of photosites: sums over lights, their 3 x 3 solution, and what it says.
 
+use multiversion::multiversion;
+
 use super::block::{Block, LANES, Lanes, ZERO};
 use super::method::{BEHIND_DEVIATIONS, BEHIND_LEVEL, LIT_ABOVE_FLOOR, START_LEVEL, START_SAMPLES};
 use super::row::VarianceModel;
@@ -30,7 +32,7 @@ pub(crate) enum Weighting {
 }
 
 /// Takes the sums at `g` and leaves the weights in the block.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting) -> Sums {
     let mut sums = Sums { matrix: [ZERO; 6], right: [ZERO; 3], chi_square: ZERO, count: ZERO };
     let least = block.least_variance();
@@ -149,4 +151,17 @@ pub(crate) fn times(matrix: &[Lanes; 6], vector: &[Lanes; 3]) -> [Lanes; 3] {
         product[2][k] = xz[k] * x[k] + yz[k] * y[k] + zz[k] * z[k];
     }
     product
+}
+
+/// Adds the solution of the sums to `g`: returns (sum w l l^T)^-1 and the square of its condition number.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(crate) fn improve(g: &mut [Lanes; 3], sums: &Sums) -> ([Lanes; 6], Lanes) {
+    let (inverse, condition_squared) = sums.inverse();
+    let change = times(&inverse, &sums.right);
+    for (g, change) in g.iter_mut().zip(&change) {
+        for k in 0..LANES {
+            g[k] += change[k];
+        }
+    }
+    (inverse, condition_squared)
 }

@@ -2,13 +2,15 @@
 //! survivors' fit; then the weighted solution of what is left. The reference says the same in
 //! `reference_robust`.
 
+use multiversion::multiversion;
+
 use super::block::{Block, LANES, Lanes, ZERO};
 use super::method::{DARK_SHARE, MAX_LIGHTS, MOST_LIGHTS_EXACT, SEARCH_SAMPLES};
-use super::normal_equations::{Weighting, accumulate, times, variance};
+use super::normal_equations::{Weighting, accumulate, improve, variance};
 use super::row::Outcome;
-use super::subset::{SubsetSearch, WIDE, Whitened};
+use super::subset::{SubsetSearch, WIDE, Whitened, best_subset};
 use super::tighten::tighten;
-use super::weighted::{Weighted, finish, step};
+use super::weighted::{Weighted, finish};
 
 /// Buffers of the subset test.
 #[derive(Default)]
@@ -19,37 +21,34 @@ pub(crate) struct RobustSolver {
 
 impl RobustSolver {
     /// Solves every photosite of a block by the subset test; writes the outcomes into the surface.
-    #[inline(always)]
     pub(crate) fn solve(&mut self, block: &mut Block) -> Weighted {
-        first_weights(block);
+        first_weights(block, &medians(block));
         let dropped = self.search(block);
         block.keep_others(&dropped);
-        let sums = accumulate(block, &[ZERO; 3], Weighting::Kept);
-        let mut g = times(&sums.inverse().0, &sums.right);
-        let sums = accumulate(block, &g, Weighting::Noise);
-        step(&mut g, &sums.inverse().0, &sums);
-
+        let mut g = [ZERO; 3];
+        for weighting in [Weighting::Kept, Weighting::Noise] {
+            let sums = accumulate(block, &g, weighting);
+            improve(&mut g, &sums);
+        }
         block.readmit();
         accumulate(block, &g, Weighting::Noise);
         let dropped = self.search(block);
         block.keep_others(&dropped);
         let sums = accumulate(block, &g, Weighting::Kept);
-        step(&mut g, &sums.inverse().0, &sums);
+        improve(&mut g, &sums);
         let sums = accumulate(block, &g, Weighting::Noise);
-        let (inverse, condition_squared) = sums.inverse();
-        step(&mut g, &inverse, &sums);
-        let mut solved = finish(block, g, inverse, &condition_squared);
+        let (inverse, condition_squared) = improve(&mut g, &sums);
+        let mut solved = finish(block, &g, &inverse, &condition_squared);
         judge(block, &dropped, &mut solved);
         solved
     }
 
-    #[inline(always)]
     fn search(&mut self, block: &Block) -> [u64; LANES] {
         let mut dropped = [0; LANES];
         for first in (0..block.len).step_by(WIDE) {
             self.samples.take(block, first);
             let found = if block.sample.len() <= MOST_LIGHTS_EXACT {
-                self.search.best(&self.samples)
+                best_subset(&mut self.search, &self.samples)
             } else {
                 tighten(&self.samples)
             };
@@ -60,9 +59,8 @@ impl RobustSolver {
 }
 
 /// 1 / var at the median sample; samples in shadow are set aside.
-#[inline(always)]
-fn first_weights(block: &mut Block) {
-    let median = medians(block);
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+fn first_weights(block: &mut Block, median: &Lanes) {
     let least = block.least_variance();
     let mut bright = ZERO;
     for sample in &block.sample {

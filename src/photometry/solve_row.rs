@@ -27,8 +27,9 @@ pub struct RowSolver {
 struct Queues {
     /// Samples missing.
     masked: Vec<Place>,
-    /// Residual too large.
+    /// Residual too large, where that is tested.
     suspect: Vec<Place>,
+    test: bool,
     /// Beyond float32.
     deferred: Vec<usize>,
 }
@@ -58,6 +59,7 @@ impl RowSolver {
         self.block.reset(input);
         self.queues.masked.clear();
         self.queues.suspect.clear();
+        self.queues.test = method == Method::Auto;
         self.queues.deferred.clear();
         for index in 0..self.pieces.list.len() {
             let piece = self.pieces.list[index];
@@ -66,8 +68,9 @@ impl RowSolver {
                 Method::LeastSquares => {
                     self.neighbours(index, input, output, least_squares_of_block);
                 }
-                Method::Weighted => self.neighbours(index, input, output, weighted_of_block),
-                Method::Auto => self.neighbours(index, input, output, weighted_or_suspect_of_block),
+                Method::Weighted | Method::Auto => {
+                    self.neighbours(index, input, output, weighted_of_block)
+                }
                 Method::Robust => {
                     self.queues.suspect.extend(
                         (piece.start..piece.end).map(|column| Place { column, piece: index }),
@@ -187,30 +190,10 @@ fn weighted_of_block(
     if block.is_dark() {
         return dark(block, output);
     }
-    let solved = solve_weighted(block);
-    solved.surface.write(block, pieces.unit, output, |k, output| {
-        defer(block, k, output, &mut queues.deferred);
-    });
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn weighted_or_suspect_of_block(
-    block: &mut Block,
-    pieces: &Pieces,
-    piece: usize,
-    columns: Range<usize>,
-    input: &RowInput,
-    output: &mut RowOutput,
-    queues: &mut Queues,
-) {
-    block.load(input, pieces, &pieces.list[piece], columns);
-    if block.is_dark() {
-        return dark(block, output);
-    }
     let mut solved = solve_weighted(block);
     let mut suspect = [false; LANES];
     for k in 0..LANES {
-        suspect[k] = solved.surface.carried[k] && solved.is_suspect(k);
+        suspect[k] = queues.test && solved.surface.carried[k] && solved.is_suspect(k);
         solved.surface.carried[k] &= !suspect[k];
     }
     solved.surface.write(block, pieces.unit, output, |k, output| {

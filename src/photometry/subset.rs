@@ -8,6 +8,8 @@
 //! Cook and Weisberg, "Residuals and Influence in Regression", 1982, chapter 2. The last of the four drops needs no more
 //! than its own r^2 / (1 - h).
 
+use multiversion::multiversion;
+
 use super::block::{Block, LANES};
 use super::method::{DROP_PENALTY, FEWEST_KEPT, LEAST_DETERMINANT, MOST_DROPPED};
 
@@ -65,7 +67,6 @@ struct Best {
 
 impl Whitened {
     /// Takes lanes `first..first + 8` of a block at its present weights.
-    #[inline(always)]
     pub(crate) fn take(&mut self, block: &Block, first: usize) {
         debug_assert!(first + WIDE <= LANES, "lanes {first} and on of {LANES}");
         let n = block.sample.len();
@@ -156,27 +157,25 @@ pub(crate) fn wide_times(matrix: &[Wide; 6], [x, y, z]: &[Wide; 3]) -> [Wide; 3]
     product
 }
 
-impl SubsetSearch {
-    /// Per photosite the set of lights (bit i for light i) whose drop minimises RSS + 12 |K|.
-    #[inline(always)]
-    pub(crate) fn best(&mut self, samples: &Whitened) -> [u64; WIDE] {
-        let n = samples.y.len();
-        self.none.fit(samples);
-        let mut best = Best::new(&samples.count);
-        best.consider(0, 0, &self.none.rss, &self.none.determinant);
-        for i in 0..n {
-            self.one.drop(&self.none, n, i);
-            best.consider(1, 1 << i, &self.one.rss, &self.one.determinant);
-            for j in i + 1..n {
-                self.two.drop(&self.one, n, j);
-                best.consider(2, 1 << i | 1 << j, &self.two.rss, &self.two.determinant);
-                for k in j + 1..n {
-                    self.two.drop_last_two(n, k, 1 << i | 1 << j | 1 << k, &mut best);
-                }
+/// Per photosite the set of lights (bit i for light i) whose drop minimises RSS + 12 |K|.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(crate) fn best_subset(search: &mut SubsetSearch, samples: &Whitened) -> [u64; WIDE] {
+    let n = samples.y.len();
+    search.none.fit(samples);
+    let mut best = Best::new(&samples.count);
+    best.consider(0, 0, &search.none.rss, &search.none.determinant);
+    for i in 0..n {
+        search.one.drop(&search.none, n, i);
+        best.consider(1, 1 << i, &search.one.rss, &search.one.determinant);
+        for j in i + 1..n {
+            search.two.drop(&search.one, n, j);
+            best.consider(2, 1 << i | 1 << j, &search.two.rss, &search.two.determinant);
+            for k in j + 1..n {
+                search.two.drop_last_two(n, k, 1 << i | 1 << j | 1 << k, &mut best);
             }
         }
-        best.dropped
     }
+    best.dropped
 }
 
 impl State {

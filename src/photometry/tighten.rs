@@ -4,6 +4,8 @@
 //! Graduated non-convexity with the truncated square: Yang, Antonante, Tzoumas and Carlone, "Graduated Non-Convexity for
 //! Robust Spatial Perception", IEEE Robotics and Automation Letters 5(2), 2020, equations 11 to 14.
 
+use multiversion::multiversion;
+
 use super::method::{DROP_PENALTY, FEWEST_KEPT};
 use super::subset::{WIDE, WIDE_ZERO, Whitened, Wide, wide_times};
 
@@ -55,7 +57,7 @@ pub(crate) fn tightened_weight(square: f64, mu: f64) -> f64 {
 }
 
 /// Per photosite the set of lights (bit i for light i) that remain outside when the cost has been tightened.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn tighten(samples: &Whitened) -> [u64; WIDE] {
     let sums = samples.sums(|i| samples.used[i]);
     let mut g = wide_times(&sums.inverse(), &sums.right);

@@ -1,8 +1,10 @@
 //! Weighted least squares of a block, with lights behind the surface left out.
 
+use multiversion::multiversion;
+
 use super::block::{Block, LANES, ZERO};
 use super::method::{MOST_LENGTHENING, REWEIGHTINGS, START_LEVEL, chi_square_limit};
-use super::normal_equations::{Sums, Weighting, accumulate, times};
+use super::normal_equations::{Weighting, accumulate, improve, times};
 use super::surface::Surface;
 
 /// Normal equations only correct an earlier fit here, so a larger condition is carried than where they make it.
@@ -33,41 +35,28 @@ impl Weighted {
 }
 
 /// Plain start, then reweighted solves.
-#[inline(always)]
 pub(crate) fn solve_weighted(block: &mut Block) -> Weighted {
-    let start = accumulate(block, &[ZERO; 3], Weighting::Bright);
-    let (inverse, _) = start.inverse();
-    let mut g = times(&inverse, &start.right);
-    let mut sums = accumulate(block, &g, Weighting::Noise);
+    let mut g = [ZERO; 3];
+    let start = accumulate(block, &g, Weighting::Bright);
+    improve(&mut g, &start);
     for _ in 1..REWEIGHTINGS {
-        let (inverse, _) = sums.inverse();
-        step(&mut g, &inverse, &sums);
-        sums = accumulate(block, &g, Weighting::Noise);
+        let sums = accumulate(block, &g, Weighting::Noise);
+        improve(&mut g, &sums);
     }
-    let (inverse, condition_squared) = sums.inverse();
-    step(&mut g, &inverse, &sums);
-    finish(block, g, inverse, &condition_squared)
-}
-
-#[inline(always)]
-pub(crate) fn step(g: &mut [[f32; LANES]; 3], inverse: &[[f32; LANES]; 6], sums: &Sums) {
-    let change = times(inverse, &sums.right);
-    for (g, change) in g.iter_mut().zip(&change) {
-        for k in 0..LANES {
-            g[k] += change[k];
-        }
-    }
+    let sums = accumulate(block, &g, Weighting::Noise);
+    let (inverse, condition_squared) = improve(&mut g, &sums);
+    finish(block, &g, &inverse, &condition_squared)
 }
 
 /// Residuals at the last solution with the weights that it was solved with.
-#[inline(always)]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(crate) fn finish(
     block: &Block,
-    g: [[f32; LANES]; 3],
-    inverse: [[f32; LANES]; 6],
+    g: &[[f32; LANES]; 3],
+    inverse: &[[f32; LANES]; 6],
     condition_squared: &[f32; LANES],
 ) -> Weighted {
-    let mut surface = Surface::new(g, MOST_LENGTHENING);
+    let mut surface = Surface::new(*g, MOST_LENGTHENING);
     let (mut chi_square, mut overlooked) = (ZERO, ZERO);
     let [gx, gy, gz] = &surface.g;
     for sample in &block.sample {
@@ -84,7 +73,7 @@ pub(crate) fn finish(
         }
     }
     let (normal, _) = surface.normal_and_length();
-    let [px, py, pz] = &times(&inverse, &normal);
+    let [px, py, pz] = &times(inverse, &normal);
     for k in 0..LANES {
         let along = px[k] * normal[0][k] + py[k] * normal[1][k] + pz[k] * normal[2][k];
         surface.tangent_variance[k] = inverse[0][k] + inverse[3][k] + inverse[5][k] - along;

@@ -1,10 +1,15 @@
 //! Cost of the kernels as ratios to touching the same bytes once, in the same run, on the same threads.
 //!
-//! `cargo bench --bench kernel` prints three tables: methods, lights (3 to 64), picture size (1 to 100 megapixels, as bands).
+//! `cargo bench --bench kernel` prints three tables: methods, lights (3 to 64), megapixels (1 to 100, as bands); a name after
+//! `--` prints only that one.
 //! What is timed is everything from 16-bit samples to normals, albedo, expected error, residual and outcome. Medians of
 //! repeats; the repeats of all lines take turns, so that a busy machine slows them alike.
 
-#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark prints a table and may stop at once")]
+#![allow(
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "a benchmark prints a table and may stop at once"
+)]
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -12,8 +17,8 @@ use std::time::Instant;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use weavelight::photometry::{
-    FieldRow, Method, Normalisation, Outcome, RowInput, RowOutput, RowSolver, VarianceModel, normalise_row,
-    reference_row,
+    FieldRow, Method, Normalisation, Outcome, RowInput, RowOutput, RowSolver, VarianceModel,
+    normalise_row, reference_row,
 };
 
 const WIDTH: usize = 4928;
@@ -42,9 +47,9 @@ impl Random {
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Nearly normal: the sum of twelve.
+    /// Nearly normal: the sum of four.
     fn gauss(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        ((0..4).map(|_| self.uniform()).sum::<f64>() - 2.0) * 3.0_f64.sqrt()
     }
 }
 
@@ -54,25 +59,34 @@ fn light_positions(count: usize) -> Vec<Vector3<f64>> {
         let share = (i as f64 + 0.5) / count as f64;
         let z = 0.6 + 0.35 * share;
         let radius = (1.0 - z * z).sqrt();
-        560.0 * Vector3::new(radius * (golden * i as f64).cos(), radius * (golden * i as f64).sin(), z)
+        560.0
+            * Vector3::new(
+                radius * (golden * i as f64).cos(),
+                radius * (golden * i as f64).sin(),
+                z,
+            )
     };
     (0..count).map(light).collect()
 }
 
 fn field_row(lights: &[Vector3<f64>], y_mm: f64) -> Vec<[f64; 3]> {
-    let node = |node: usize| Vector3::new(0.085 * (node * STEP) as f64 - 0.0425 * WIDTH as f64, y_mm, 0.0);
+    let node =
+        |node: usize| Vector3::new(0.085 * (node * STEP) as f64 - 0.0425 * WIDTH as f64, y_mm, 0.0);
     let vector = move |light: &Vector3<f64>, at: Vector3<f64>| {
         let to_light = light - at;
         (to_light * 560.0_f64.powi(2) / to_light.norm().powi(3)).into()
     };
-    (0..=WIDTH.div_ceil(STEP)).flat_map(|k| lights.iter().map(move |l| vector(l, node(k)))).collect()
+    (0..=WIDTH.div_ceil(STEP))
+        .flat_map(|k| lights.iter().map(move |l| vector(l, node(k))))
+        .collect()
 }
 
 impl Band {
     /// Wavy cloth; the share `failing` of the photosites has one sample in shadow or in a highlight.
     fn new(lights: usize, rows: usize, failing: f64) -> Self {
         let positions = light_positions(lights);
-        let field = [field_row(&positions, 10.0), field_row(&positions, 10.0 + 0.085 * rows as f64)];
+        let field =
+            [field_row(&positions, 10.0), field_row(&positions, 10.0 + 0.085 * rows as f64)];
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let mut frames = vec![vec![0_u16; rows * WIDTH]; lights];
         let nodes = FieldRow { step: STEP, vectors: &field[0], lights };
@@ -80,7 +94,11 @@ impl Band {
             let column = place % WIDTH;
             let (a, b) = ((0.4 * column as f64).sin(), (0.23 * (place / WIDTH) as f64).cos());
             let g = 0.5 * Vector3::new(0.5 * a, 0.5 * b, 1.0).normalize();
-            let spoilt = if random.uniform() < failing { (random.uniform() * lights as f64) as usize } else { lights };
+            let spoilt = if random.uniform() < failing {
+                (random.uniform() * lights as f64) as usize
+            } else {
+                lights
+            };
             for (i, frame) in frames.iter_mut().enumerate() {
                 let mut y = g.dot(&nodes.at(column, i)).max(0.0);
                 if i == spoilt {
@@ -88,7 +106,8 @@ impl Band {
                 }
                 let signal = y * f64::from(FULL) / 2.0;
                 let noise = (signal / ELECTRONS_PER_DN + 3.0).sqrt() * random.gauss();
-                frame[place] = (f64::from(BLACK) + signal + noise).round().clamp(0.0, 16_383.0) as u16;
+                frame[place] =
+                    (f64::from(BLACK) + signal + noise).round().clamp(0.0, 16_383.0) as u16;
             }
         }
         Self { rows, frames, field, variance: vec![[noise(); 2]; lights] }
@@ -135,7 +154,8 @@ impl Output {
     /// Rows with their number, in parallel.
     fn rows(&mut self) -> impl IndexedParallelIterator<Item = (usize, RowOutput<'_>)> {
         let parts = self.normal.par_chunks_mut(WIDTH).zip(self.albedo.par_chunks_mut(WIDTH));
-        let parts = parts.zip(self.error.par_chunks_mut(WIDTH)).zip(self.residual.par_chunks_mut(WIDTH));
+        let parts =
+            parts.zip(self.error.par_chunks_mut(WIDTH)).zip(self.residual.par_chunks_mut(WIDTH));
         let parts = parts.zip(self.outcome.par_chunks_mut(WIDTH)).enumerate();
         parts.map(|(row, ((((normal, albedo), expected_error_deg), residual), outcome))| {
             (row, RowOutput { normal, albedo, expected_error_deg, residual, outcome, kept: None })
@@ -147,7 +167,8 @@ impl Output {
 fn touch(band: &Band, output: &mut Output) {
     output.rows().for_each(|(row, out)| {
         let place = row * WIDTH..(row + 1) * WIDTH;
-        let sum = |frame: &Vec<u16>| frame[place.clone()].iter().map(|&v| u32::from(v)).sum::<u32>();
+        let sum =
+            |frame: &Vec<u16>| frame[place.clone()].iter().map(|&v| u32::from(v)).sum::<u32>();
         let value = band.frames.iter().map(sum).sum::<u32>() as f32;
         out.normal.fill([value; 3]);
         out.albedo.fill(value);
@@ -158,7 +179,12 @@ fn touch(band: &Band, output: &mut Output) {
 }
 
 /// Normalises a row and hands it to `solve`.
-fn with_row(band: &Band, row: usize, buffers: &mut Buffers, solve: impl FnOnce(&mut RowSolver, &RowInput)) {
+fn with_row(
+    band: &Band,
+    row: usize,
+    buffers: &mut Buffers,
+    solve: impl FnOnce(&mut RowSolver, &RowInput),
+) {
     let lights = band.frames.len();
     let scale = 2.0 / FULL;
     let with = Normalisation { black: [BLACK; 2], scale: [scale; 2], saturation: [16_383; 2] };
@@ -192,7 +218,9 @@ fn solve(band: &Band, output: &mut Output, method: Method) {
     output.rows().for_each_init(
         || Buffers::new(band),
         |buffers, (row, mut out)| {
-            with_row(band, row, buffers, |solver, input| solver.solve(input, &mut out, method).unwrap());
+            with_row(band, row, buffers, |solver, input| {
+                solver.solve(input, &mut out, method).unwrap()
+            });
         },
     );
 }
@@ -202,7 +230,9 @@ fn normal_equations(band: &Band, output: &mut Output, thin: usize) {
     output.rows().filter(|(row, _)| row % thin == 0).for_each_init(
         || Buffers::new(band),
         |buffers, (row, mut out)| {
-            with_row(band, row, buffers, |_, input| reference_row(input, &mut out, Method::LeastSquares));
+            with_row(band, row, buffers, |_, input| {
+                reference_row(input, &mut out, Method::LeastSquares)
+            });
         },
     );
 }
@@ -267,13 +297,17 @@ fn table(title: &str, repeats: usize, rows: usize, mut lines: Vec<(String, f64, 
     black_box(&output.normal);
 }
 
-fn line<'a>(name: impl Into<String>, work: impl FnMut(&mut Output) + 'a) -> (String, f64, Work<'a>) {
+fn line<'a>(
+    name: impl Into<String>,
+    work: impl FnMut(&mut Output) + 'a,
+) -> (String, f64, Work<'a>) {
     (name.into(), 1.0, Box::new(work))
 }
 
 fn methods(repeats: usize, rows: usize) {
     let clean = Band::new(10, rows, 0.0);
-    let failing: Vec<(f64, Band)> = [0.005, 0.01, 0.02, 0.05, 0.2].map(|f| (f, Band::new(10, rows, f))).into();
+    let failing: Vec<(f64, Band)> =
+        [0.005, 0.01, 0.02, 0.05, 0.2].map(|f| (f, Band::new(10, rows, f))).into();
     let thin = 64;
     let mut lines = vec![
         line(format!("touch once ({} MB)", clean.bytes() / 1_000_000), |out| touch(&clean, out)),
@@ -291,11 +325,16 @@ fn methods(repeats: usize, rows: usize) {
         thin as f64,
         Box::new(|out| normal_equations(&clean, out, thin)),
     ));
-    lines.push(("SVD per photosite x 4".into(), thin as f64, Box::new(|out| svd_four_times(&clean, out, thin))));
+    lines.push((
+        "SVD per photosite x 4".into(),
+        thin as f64,
+        Box::new(|out| svd_four_times(&clean, out, thin)),
+    ));
     table("Methods, 10 lights", repeats, rows, lines);
 }
 
 fn lights(repeats: usize, rows: usize) {
+    let (repeats, rows) = (repeats.min(3), rows.div_ceil(4));
     for count in [3, 4, 6, 10, 14, 15, 24, 32, 48, 64] {
         let band = Band::new(count, rows, 0.01);
         let lines = vec![
@@ -309,14 +348,18 @@ fn lights(repeats: usize, rows: usize) {
 }
 
 fn megapixels(repeats: usize, rows: usize) {
+    let repeats = repeats.min(3);
     let band = Band::new(10, rows, 0.01);
     let per_band = (rows * WIDTH) as f64 / 1e6;
     for size in [1.0, 4.0, 16.0, 50.0, 100.0_f64] {
         let bands = (size / per_band).round().max(1.0) as usize;
-        let repeated = |work: &dyn Fn(&mut Output), out: &mut Output| (0..bands).for_each(|_| work(out));
+        let repeated =
+            |work: &dyn Fn(&mut Output), out: &mut Output| (0..bands).for_each(|_| work(out));
         let lines = vec![
             line("touch once", |out| repeated(&|out| touch(&band, out), out)),
-            line("least squares", |out| repeated(&|out| solve(&band, out, Method::LeastSquares), out)),
+            line("least squares", |out| {
+                repeated(&|out| solve(&band, out, Method::LeastSquares), out)
+            }),
             line("auto, 1 % failing", |out| repeated(&|out| solve(&band, out, Method::Auto), out)),
         ];
         table(&format!("{:.1} megapixels", bands as f64 * per_band), repeats, rows, lines);
@@ -325,12 +368,17 @@ fn megapixels(repeats: usize, rows: usize) {
 
 fn main() {
     // `cargo test` runs benches too, without `--bench`: then only see that it works.
-    let full = std::env::args().any(|a| a == "--bench");
-    let (repeats, rows) = if full { (7, 408) } else { (1, 4) };
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let full = arguments.iter().any(|a| a == "--bench");
+    let (repeats, rows) = if full { (5, 256) } else { (1, 4) };
     println!("{} threads, bands of {WIDTH} x {rows}", rayon::current_num_threads());
-    methods(repeats, rows);
-    if full {
-        lights(repeats.min(3), rows / 4);
-        megapixels(repeats.min(3), rows / 2);
+    let tables: [(&str, fn(usize, usize)); 3] =
+        [("methods", methods), ("lights", lights), ("megapixels", megapixels)];
+    let named = |name: &str| arguments.iter().any(|a| a == name);
+    let all = !tables.iter().any(|(name, _)| named(name));
+    for (name, table) in tables {
+        if named(name) || (all && (full || name == "methods")) {
+            table(repeats, rows);
+        }
     }
 }
