@@ -104,7 +104,8 @@ impl Sensor {
         let x = self.unbend(electrons / full_well);
         let range = f32::from(self.saturation - self.black[cell]);
         let number = f32::from(self.black[cell]) + x * range;
-        number.round().clamp(0.0, f32::from(self.saturation)) as u16
+        // Rounded half up; a cast truncates, and `round` is a call where the processor's own instruction may be missing.
+        (number.clamp(0.0, f32::from(self.saturation)) + 0.5) as u16
     }
 
     /// Photons are Poisson; reading is Gaussian.

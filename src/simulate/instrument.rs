@@ -256,8 +256,8 @@ fn check_lights(options: &Options, stage: &Stage) -> Result<(), SimulateError> {
     let count = stage.lights.len();
     let named = [
         ("--hand", options.targets.hand.map(|k| vec![k])),
-        ("--dead-light", options.flaws.dead.map(|k| vec![k])),
-        ("--swap-lights", options.flaws.swapped.map(|pair| pair.to_vec())),
+        ("--dead", options.flaws.dead.map(|k| vec![k])),
+        ("--swapped", options.flaws.swapped.map(|pair| pair.to_vec())),
     ];
     for (option, lights) in named {
         if let Some(light) = lights.into_iter().flatten().find(|&light| light >= count) {

@@ -266,7 +266,7 @@ impl Options {
     }
 
     /// The fabric on the table.
-    pub(super) fn fabric(&self) -> Fabric {
+    pub fn fabric(&self) -> Fabric {
         let material = &self.material;
         let mut cloth = material.preset.cloth(self.seed);
         let own_threads = material.threads_per_cm.is_some() || material.yarn_radius_mm.is_some();

@@ -172,7 +172,7 @@ fn impossible_options_are_named_and_leave_nothing() {
     check(&|o| o.material.threads_per_cm = Some(0.0), "--threads-per-cm is 0;");
     check(&|o| o.size_px = Some([0, 100]), "--size is 0x100;");
     check(&|o| o.size_px = Some([100, 1 << 40]), "--size");
-    check(&|o| o.flaws.dead = Some(10), "--dead-light is 10;");
+    check(&|o| o.flaws.dead = Some(10), "--dead is 10;");
     check(&|o| o.rig = Some("nowhere.toml".into()), "nowhere.toml");
 }
 

@@ -73,7 +73,7 @@ fn write_frame(
     let name = format!("{}.dng", picture.stem);
     let path = folder.join(&name);
     let failed = |source| FileError::write(&path, source);
-    let bytes = encode(samples, picture.exposure_s, captured, instrument).map_err(failed)?;
+    let bytes = instrument.encode(samples, picture.exposure_s, ISO, captured).map_err(failed)?;
     std::fs::write(&path, &bytes).map_err(failed)?;
     Ok(FrameEntry {
         sha256: Some(sha256_hex(&bytes)),
@@ -84,36 +84,43 @@ fn write_frame(
     })
 }
 
-fn encode(
-    samples: &[u16],
-    exposure_s: f64,
-    captured: Option<jiff::Timestamp>,
-    instrument: &Instrument,
-) -> std::io::Result<Vec<u8>> {
-    let [width, height] = instrument.size_px();
-    let camera = &instrument.rig.camera;
-    let name = camera.model.as_deref().unwrap_or("Weavelight Simulator");
-    let (make, model) = name.split_once(' ').unwrap_or(("Weavelight", name));
-    let date_time =
-        captured.map_or_else(String::new, |at| at.strftime("%Y:%m:%d %H:%M:%S").to_string());
-    let dng = Dng {
-        width,
-        height,
-        samples,
-        cfa: instrument.stage.cfa,
-        black: instrument.sensor.black,
-        white: instrument.sensor.saturation,
-        make,
-        model,
-        software: PROGRAM,
-        date_time: &date_time,
-        exposure_s,
-        iso: ISO,
-        focal_length_mm: camera.focal_length_mm.unwrap_or(0.0),
-        neutral: instrument.neutral(),
-        camera_from_xyz: instrument.camera_from_xyz(),
-    };
-    let mut bytes = Vec::with_capacity(samples.len() * 2 + 4096);
-    dng.write(&mut bytes)?;
-    Ok(bytes)
+impl Instrument {
+    /// A frame's DNG file: what a camera of this kind would hand over.
+    ///
+    /// # Errors
+    /// Where the samples do not fill the frame.
+    pub fn encode(
+        &self,
+        samples: &[u16],
+        exposure_s: f64,
+        iso: f64,
+        captured: Option<jiff::Timestamp>,
+    ) -> std::io::Result<Vec<u8>> {
+        let [width, height] = self.size_px();
+        let camera = &self.rig.camera;
+        let name = camera.model.as_deref().unwrap_or("Weavelight Simulator");
+        let (make, model) = name.split_once(' ').unwrap_or(("Weavelight", name));
+        let date_time =
+            captured.map_or_else(String::new, |at| at.strftime("%Y:%m:%d %H:%M:%S").to_string());
+        let dng = Dng {
+            width,
+            height,
+            samples,
+            cfa: self.stage.cfa,
+            black: self.sensor.black,
+            white: self.sensor.saturation,
+            make,
+            model,
+            software: PROGRAM,
+            date_time: &date_time,
+            exposure_s,
+            iso,
+            focal_length_mm: camera.focal_length_mm.unwrap_or(0.0),
+            neutral: self.neutral(),
+            camera_from_xyz: self.camera_from_xyz(),
+        };
+        let mut bytes = Vec::with_capacity(samples.len() * 2 + 4096);
+        dng.write(&mut bytes)?;
+        Ok(bytes)
+    }
 }

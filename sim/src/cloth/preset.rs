@@ -51,7 +51,7 @@ impl Preset {
                 tuft_height_mm: 0.05,
                 nap_mm: 14.0,
                 nap_height_mm: 0.6,
-                color: [0.16, 0.012, 0.028],
+                color: [0.24, 0.035, 0.055],
                 seed,
             }),
             Preset::Knit => Structure::Knit.relief(None, None, seed),
@@ -63,7 +63,7 @@ impl Preset {
     fn reflectance(self) -> Reflectance {
         match self {
             Preset::Satin => Reflectance::Satin { f0: 0.05, alpha: 0.28 },
-            Preset::Velvet => Reflectance::Velvet { sheen: [0.45, 0.12, 0.16], alpha: 0.35 },
+            Preset::Velvet => Reflectance::Velvet { sheen: [0.12, 0.05, 0.06], alpha: 0.35 },
             _ => Reflectance::Lambert,
         }
     }

@@ -1,5 +1,5 @@
 use super::{Point, Top};
-use crate::random::{Key, line_noise};
+use crate::random::{Key, line_noise, split};
 
 /// What all yarns of one family (warp, weft, a knit's only yarn) have in common.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,7 +100,7 @@ impl Yarn {
 /// A wave of period 1 and height 1 made of parabolas, like a sine with a continuous slope; with its derivative.
 #[inline]
 fn round_wave(t: f64) -> (f64, f64) {
-    let t = t - t.floor();
+    let (_, t) = split(t);
     let (half, sign) = if t < 0.5 { (t, 1.0) } else { (t - 0.5, -1.0) };
     (sign * 16.0 * half * (0.5 - half), sign * (8.0 - 32.0 * half))
 }

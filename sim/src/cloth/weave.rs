@@ -1,6 +1,6 @@
 use super::thread::{Crown, Lens, Yarn, ground};
 use super::{Point, Top};
-use crate::random::{Key, smooth_step};
+use crate::random::{Key, smooth_step, split};
 
 /// Warp (along y) and weft (along x), each over or under the other by a pattern.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,10 +51,9 @@ impl Woven {
         let mut best = ground(low);
         for (family, across, along) in [(WARP, x, y), (WEFT, y, x)] {
             let yarn = self.yarn(family);
-            let place = across / yarn.spacing_mm;
-            let nearest = place.floor();
-            let neighbour = if place - nearest < 0.5 { -1 } else { 1 };
-            for index in [nearest as i64, nearest as i64 + neighbour] {
+            let (nearest, share) = split(across / yarn.spacing_mm);
+            let neighbour = if share < 0.5 { -1 } else { 1 };
+            for index in [nearest, nearest + neighbour] {
                 let Some(crown) = self.crown(family, index, across, along) else { continue };
                 if crown.height_mm > best.height_mm {
                     best = Point {
@@ -100,8 +99,7 @@ impl Woven {
     #[inline]
     fn edge(&self, family: u8, index: i64, along: f64) -> (f64, f64) {
         let pitch = self.yarn(1 - family).spacing_mm;
-        let place = along / pitch - 0.5;
-        let crossing = place.floor();
+        let (crossing, share) = split(along / pitch - 0.5);
         let level = |other: i64| {
             let warp_up = match family {
                 WARP => self.pattern.warp_on_top(index, other),
@@ -109,8 +107,8 @@ impl Woven {
             };
             if warp_up { self.crimp_mm } else { -self.crimp_mm }
         };
-        let (here, next) = (level(crossing as i64), level(crossing as i64 + 1));
-        let (s, ds) = smooth_step(place - crossing);
+        let (here, next) = (level(crossing), level(crossing + 1));
+        let (s, ds) = smooth_step(share);
         (here + (next - here) * s, (next - here) * ds / pitch)
     }
 
