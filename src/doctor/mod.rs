@@ -1,7 +1,7 @@
 //! What of the machine and the instrument is there and usable, without touching any of it.
 
 use crate::device::board::{BoardError, Identity, PortChoice, PortFinding, diagnose};
-use crate::instrument::{Controller, Rig};
+use crate::instrument::Rig;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -56,11 +56,7 @@ pub struct LightBoard {
 /// Asks for light boards at the port that the rig names, or at every port that could be one's. Opening a port restarts the
 /// board behind it; one in use by a scan is told as busy and left alone. Takes up to five seconds where nobody answers.
 pub fn examine_boards(rig: Option<&Rig>) -> Vec<LightBoard> {
-    let choice = match rig.and_then(|rig| rig.controller.as_ref()) {
-        Some(Controller::Simulated) => return Vec::new(),
-        Some(Controller::Serial { port: Some(port) }) => PortChoice::Path(port.into()),
-        Some(Controller::Serial { port: None }) | None => PortChoice::Find,
-    };
+    let choice = rig.map_or(PortChoice::Find, PortChoice::of_rig);
     diagnose(&choice, rig.map(|rig| rig.lights.len())).into_iter().map(light_board).collect()
 }
 

@@ -88,6 +88,14 @@ pub(crate) fn sealed(line: &str) -> String {
     }
 }
 
+/// `pattern` with the clock of `line` in the place of `<ms>`, and the right checksum in that of `*HH`.
+pub(crate) fn filled_in(pattern: &str, line: &str) -> String {
+    let Some((before, after)) = pattern.split_once("<ms>") else { return sealed(pattern) };
+    let clock: String =
+        line.chars().skip(before.len()).take(10).filter(char::is_ascii_digit).collect();
+    sealed(&format!("{before}{clock:0>10}{after}"))
+}
+
 /// With ten digits in the clock's place, where the line may have fewer, or `<ms>` for `now`.
 pub(crate) fn with_clock(line: &str, now: Duration) -> String {
     let line = line.replace("<ms>", &now.as_millis().to_string());

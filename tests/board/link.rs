@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use weavelight::device::board::wire::{LIGHTS_MAX, seal};
-use weavelight::device::board::{Board, Interruption, PortChoice, diagnose};
+use weavelight::device::board::{Board, Interruption, PortChoice, SimulatedBoard, diagnose};
 
 /// What the light must be after an interruption, in seconds of the board's clock: the limit.
 const DARK_AFTER_US: u64 = 1_000_000;
@@ -324,4 +324,21 @@ fn doctor_finds_the_board_of_the_rig() {
     );
     let found = doctor(8);
     assert!(found.contains("the board has 10 lights, rig.toml has 8"), "{found}");
+}
+
+#[test]
+fn a_simulated_board_behaves_as_one_at_a_port() {
+    let simulated = SimulatedBoard::new(16);
+    let board = Board::open(PortChoice::Simulated(simulated.clone()), Some(16)).unwrap();
+    for number in [0, 15, 7] {
+        light(&board, number);
+        assert_eq!(simulated.pins(), 1 << number);
+    }
+    std::thread::sleep(Duration::from_millis(700));
+    assert_eq!(simulated.pins(), 1 << 7, "kept awake");
+    assert_eq!(board.take_interruptions(), []);
+    drop(board);
+    assert_eq!(simulated.pins(), 0);
+    let error = Board::open(PortChoice::Simulated(simulated), Some(10)).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("the board has 16 lights"), "{error}");
 }

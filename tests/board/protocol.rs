@@ -1,8 +1,9 @@
 //! PROTOCOL.md's exchanges, replayed at both ends.
 
-use crate::exchange::{Host, Step, of_protocol, sealed, with_clock};
+use crate::exchange::{Host, Step, filled_in, of_protocol, sealed, with_clock};
 use crate::simboard::Stepped;
 use std::time::Duration;
+use weavelight::device::board::BoardModel;
 use weavelight::device::board::wire::Line;
 
 #[test]
@@ -51,5 +52,38 @@ fn replay(board: &mut Stepped, step: &Step) {
         Step::Reset => board.command("reset"),
         Step::Pins(pins) => assert_eq!(board.pins(), *pins, "pins"),
         Step::Ask(_) | Step::Told(_) => {}
+    }
+}
+
+#[test]
+fn the_simulated_board_keeps_to_the_protocol() {
+    for (number, steps) in of_protocol() {
+        let mut board = BoardModel::new(10, Duration::ZERO);
+        if !matches!(&steps[0], Step::FromBoard(line) if line.starts_with("! BOOT")) {
+            board.take_output();
+        }
+        let mut said = String::from_utf8(board.take_output()).unwrap();
+        let mut now = Duration::ZERO;
+        for step in steps {
+            println!("exchange {number}: {step:?}");
+            now += Duration::from_millis(4);
+            match step {
+                Step::ToBoard(line) => board.receive(format!("{line}\n").as_bytes(), now),
+                Step::Wait(duration) | Step::Silence(duration) => {
+                    now += duration;
+                    board.advance(now);
+                }
+                Step::Reset => board.reset(now),
+                Step::Pins(pins) => assert_eq!(board.pins(), pins),
+                Step::FromBoard(pattern) => {
+                    let line = said.lines().next().unwrap_or_default().to_owned();
+                    assert_eq!(line, filled_in(&pattern, &line));
+                    said.drain(..=line.len());
+                }
+                Step::Ask(_) | Step::Told(_) => {}
+            }
+            said += &String::from_utf8(board.take_output()).unwrap();
+        }
+        assert_eq!(said, "", "exchange {number}: the board says more");
     }
 }

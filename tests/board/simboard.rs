@@ -1,6 +1,6 @@
 //! The simulated board: the real firmware in libsimavr, in a process of its own.
 
-use crate::exchange::sealed;
+use crate::exchange::filled_in;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -201,15 +201,7 @@ impl Stepped {
     pub(crate) fn expect_line(&mut self, pattern: &str) {
         let line =
             self.next_line(700_000).unwrap_or_else(|| panic!("no answer, but expected {pattern}"));
-        let expected = match pattern.split_once("<ms>") {
-            Some((before, after)) => {
-                let digits: String =
-                    line.chars().skip(before.len()).take_while(char::is_ascii_digit).collect();
-                format!("{before}{digits}{after}")
-            }
-            None => pattern.to_owned(),
-        };
-        assert_eq!(line, sealed(&expected));
+        assert_eq!(line, filled_in(pattern, &line));
     }
 
     pub(crate) fn pins(&self) -> u32 {

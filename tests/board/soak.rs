@@ -5,8 +5,8 @@ use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
-use weavelight::device::board::wire::{Answer, Request, seal};
-use weavelight::device::board::{Board, Event, LightBoard, PortChoice};
+use weavelight::device::board::wire::{Answer, Request};
+use weavelight::device::board::{Board, BoardModel, Event, LightBoard, PortChoice};
 
 /// The host's state machine at the simulated board, in the board's time.
 struct Pair {
@@ -117,10 +117,10 @@ fn four_hours_of_the_hosts_clock() {
     assert!(gaps < Duration::from_millis(500), "the board would have gone dark: {gaps:?}");
 }
 
-/// A board in a few lines, with a bad wire: one in a hundred lines is damaged on either way.
+/// The simulated board behind a bad wire: one in a hundred lines is damaged on either way.
 struct Model {
     random: TestRng,
-    pins: u32,
+    board: BoardModel,
     answers: VecDeque<(Duration, String)>,
     spoken_to: Duration,
     lines: u64,
@@ -128,38 +128,34 @@ struct Model {
 
 impl Model {
     fn new() -> Self {
+        let mut board = BoardModel::new(10, Duration::ZERO);
+        board.take_output();
         let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
-        Self { random, pins: 0, answers: VecDeque::new(), spoken_to: Duration::ZERO, lines: 0 }
+        Self { random, board, answers: VecDeque::new(), spoken_to: Duration::ZERO, lines: 0 }
     }
 
-    fn damaged(&mut self) -> bool {
-        self.random.next_u32().is_multiple_of(100)
+    fn perhaps_damaged(&mut self, line: &str) -> String {
+        self.lines += 1;
+        if self.random.next_u32().is_multiple_of(100) {
+            line.replacen(' ', "", 1)
+        } else {
+            line.to_owned()
+        }
     }
 
     fn receive(&mut self, bytes: &[u8], now: Duration) {
         for line in
             String::from_utf8(bytes.to_vec()).unwrap().lines().filter(|line| !line.is_empty())
         {
-            self.lines += 1;
-            let mut answer = if self.damaged() {
-                seal("? ERR 2 CHECKSUM")
-            } else {
+            let arrived = self.perhaps_damaged(line);
+            if arrived == line {
                 self.spoken_to = now;
-                self.obey(line, now)
-            };
-            if self.damaged() {
-                answer = answer.replacen(' ', "", 1);
             }
+            self.board.receive(format!("{arrived}\n").as_bytes(), now);
+            let answer = String::from_utf8(self.board.take_output()).unwrap();
+            let answer = self.perhaps_damaged(&answer);
             self.answers.push_back((now + Duration::from_millis(4), answer));
         }
-    }
-
-    fn obey(&mut self, line: &str, now: Duration) -> String {
-        let words: Vec<&str> = line.split([' ', '*']).collect();
-        if words[1] == "LIGHT" {
-            self.pins = 1 << words[2].parse::<u32>().unwrap();
-        }
-        seal(&format!("{} OK {:05X} {:010}", words[0], self.pins, now.as_millis()))
     }
 
     fn due(&self) -> Option<Duration> {

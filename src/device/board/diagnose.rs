@@ -23,6 +23,7 @@ pub fn diagnose(choice: &PortChoice, lights: Option<usize>) -> Vec<PortFinding> 
     let ports = match choice {
         PortChoice::Path(port) => vec![port.clone()],
         PortChoice::Find => candidates(),
+        PortChoice::Simulated(_) => Vec::new(),
     };
     std::thread::scope(|scope| {
         let threads: Vec<_> =

@@ -1,12 +1,12 @@
 //! The board at its port: a thread that drives the state machine, so that keep-alives go on whatever the caller waits for,
 //! another that reads, and, after the port has gone away, one that looks for it.
 
-use super::connection::{Connection, read_some};
-use super::discovery::{PortChoice, find};
+use super::connection::Connection;
+use super::discovery::{PortChoice, connect_at, find, find_again};
 use super::error::BoardError;
 use super::machine::{Event, Interruption, LightBoard};
+use super::stream::Stream;
 use super::wire::{Answer, Identity, Outputs, Request, Setting};
-use serialport::SerialPort;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -254,7 +254,7 @@ struct Worker {
 
 /// While the port is open.
 struct Link {
-    serial: Box<dyn SerialPort>,
+    stream: Box<dyn Stream>,
     board: LightBoard,
 }
 
@@ -329,7 +329,7 @@ impl Worker {
     fn write(&mut self) {
         let Some(link) = &mut self.link else { return };
         let output = link.board.take_output();
-        if !output.is_empty() && link.serial.write_all(&output).is_err() {
+        if !output.is_empty() && link.stream.send(&output).is_err() {
             self.lose();
         }
     }
@@ -361,8 +361,8 @@ impl Worker {
     }
 
     fn take_connection(&mut self, connection: Connection) {
-        match connection.serial.try_clone() {
-            Ok(serial) => self.start_reading(serial),
+        match connection.stream.try_clone() {
+            Ok(stream) => self.start_reading(stream),
             Err(_) => return self.search(),
         }
         {
@@ -371,16 +371,16 @@ impl Worker {
             state.connected = true;
             self.shared.changed.notify_all();
         }
-        self.link = Some(Link { serial: connection.serial, board: connection.board });
+        self.link = Some(Link { stream: connection.stream, board: connection.board });
     }
 
-    fn start_reading(&mut self, mut serial: Box<dyn SerialPort>) {
+    fn start_reading(&mut self, mut stream: Box<dyn Stream>) {
         let lifetime = self.shared.start_lifetime();
         let (messages, shared) = (self.messages.clone(), Arc::clone(&self.shared));
         self.reader = Some(std::thread::spawn(move || {
             let mut bytes = [0; 256];
             while shared.lifetime() == lifetime {
-                let message = match read_some(serial.as_mut(), &mut bytes) {
+                let message = match stream.read_some(&mut bytes) {
                     Ok(0) => continue,
                     Ok(count) => Message::Arrived(lifetime, bytes[..count].to_vec()),
                     Err(_) => Message::Gone(lifetime),
@@ -419,11 +419,12 @@ impl Worker {
         let lifetime = self.shared.start_lifetime();
         self.stop_reading();
         let (choice, expected, origin) = (self.choice.clone(), self.expected.clone(), self.origin);
+        let last = self.shared.lock().port.clone();
         let (messages, shared) = (self.messages.clone(), Arc::clone(&self.shared));
         std::thread::spawn(move || {
             while shared.lifetime() == lifetime {
                 std::thread::sleep(SEARCH_INTERVAL);
-                match find(&choice, origin) {
+                match find_again(&choice, &last, origin) {
                     Ok(connection) if connection.identity == expected => {
                         let _ = messages.send(Message::Found(Box::new(connection)));
                         return;
@@ -439,7 +440,7 @@ impl Worker {
         self.shared.lifetime.store(ENDED, Ordering::SeqCst);
         if let Some(link) = &mut self.link {
             let off = format!("\n{}", Request::Off.line(0));
-            let _ = link.serial.write_all(off.as_bytes());
+            let _ = link.stream.send(off.as_bytes());
         }
         self.stop_reading();
     }
@@ -447,5 +448,5 @@ impl Worker {
 
 /// One look at a port, for `doctor`: who is there, or why nobody can be reached. The port is opened, which restarts the board.
 pub fn identify_at(port: &Path) -> Result<Identity, BoardError> {
-    super::connection::connect(port, Instant::now()).map(|connection| connection.identity)
+    connect_at(port, Instant::now()).map(|connection| connection.identity)
 }

@@ -1,7 +1,7 @@
 //! The light board: its protocol, and the serial link around it.
 //!
 //! [`wire`] is the lines, [`LightBoard`] the host's end of the protocol as a state machine without input and output, [`Board`]
-//! the board at a serial port. `firmware/PROTOCOL.md` describes the protocol, `firmware/weavelight` is the other end.
+//! the board at a serial port or in memory ([`SimulatedBoard`]). `firmware/PROTOCOL.md` describes the protocol, `firmware/weavelight` is the other end.
 
 mod connection;
 mod diagnose;
@@ -9,6 +9,8 @@ mod discovery;
 mod error;
 mod link;
 mod machine;
+mod model;
+mod stream;
 pub mod wire;
 
 pub use diagnose::{PortFinding, diagnose};
@@ -19,4 +21,6 @@ pub use machine::{
     BUDGET, Busy, Event, Failure, IDENTIFY_BUDGET, IDENTIFY_RETRY, Interruption, KEEP_ALIVE,
     LightBoard, RETRY, RETRY_AT_ONCE,
 };
+pub use model::BoardModel;
+pub use stream::SimulatedBoard;
 pub use wire::{Identity, Outputs, Setting};
