@@ -30,6 +30,8 @@ static void send_event(const char *event, const char *cause) {
 }
 
 void send_boot() {
+    // Ends a line that the restart cut off.
+    Serial.write('\n');
     send_event("BOOT", reset_cause());
 }
 

@@ -1,6 +1,7 @@
 //! `weavelight doctor`
 
 use super::output::{Failure, Output};
+use crate::device::board::PortChoice;
 use crate::doctor::{Examination, LightBoard, SerialPort, examine, examine_boards};
 use crate::instrument::Rig;
 use std::path::PathBuf;
@@ -20,7 +21,8 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let rig = args.rig.as_deref().map(Rig::load).transpose().map_err(Failure::work)?;
     let examination = examine(&args.folder);
-    let boards = examine_boards(rig.as_ref());
+    let choice = rig.as_ref().map_or(PortChoice::Find, PortChoice::of_rig);
+    let boards = examine_boards(&choice, rig.as_ref().map(|rig| rig.lights.len()));
     let mut json = serde_json::to_value(&examination).map_err(Failure::work)?;
     json["light_boards"] = serde_json::to_value(&boards).map_err(Failure::work)?;
     Ok(Output { text: text(&examination, &boards), json, ..Output::default() })

@@ -1,7 +1,6 @@
 //! What of the machine and the instrument is there and usable, without touching any of it.
 
 use crate::device::board::{BoardError, Identity, PortChoice, PortFinding, diagnose};
-use crate::instrument::Rig;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -53,11 +52,10 @@ pub struct LightBoard {
     pub problem: Option<String>,
 }
 
-/// Asks for light boards at the port that the rig names, or at every port that could be one's. Opening a port restarts the
+/// Asks for light boards at the named port, or at every port that could be one's; `lights`: how many the rig has. Opening a port restarts the
 /// board behind it; one in use by a scan is told as busy and left alone. Takes up to five seconds where nobody answers.
-pub fn examine_boards(rig: Option<&Rig>) -> Vec<LightBoard> {
-    let choice = rig.map_or(PortChoice::Find, PortChoice::of_rig);
-    diagnose(&choice, rig.map(|rig| rig.lights.len())).into_iter().map(light_board).collect()
+pub fn examine_boards(choice: &PortChoice, lights: Option<usize>) -> Vec<LightBoard> {
+    diagnose(choice, lights).into_iter().map(light_board).collect()
 }
 
 fn light_board(finding: PortFinding) -> LightBoard {

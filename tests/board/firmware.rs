@@ -163,3 +163,15 @@ fn a_bootloader_delays_the_first_answer() {
     board.run_to_line(0); // answers to what was asked meanwhile
     light(&mut board, 2, 3, None);
 }
+
+#[test]
+fn a_restart_in_the_middle_of_a_line_is_still_told() {
+    let Some(mut board) = started() else { return };
+    board.send(Request::Identify.line(1).as_bytes());
+    // The request takes 0.8 ms on the wire, the answer 2.9.
+    board.run(2_000);
+    board.command("reset");
+    let cut = board.next_line(100_000).unwrap();
+    assert!("1 OK WEAVELIGHT 1.0.0 1 10 LBT*AE".starts_with(&cut) && !cut.contains('*'), "{cut:?}");
+    board.expect_line("! BOOT RESET*HH");
+}

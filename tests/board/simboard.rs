@@ -189,12 +189,16 @@ impl Stepped {
 
     /// The next line, its end removed; `None` if none comes within `us`.
     pub(crate) fn next_line(&mut self, us: u64) -> Option<String> {
-        if !self.arrived.contains(&b'\n') {
-            self.pass("line", us);
+        loop {
+            if !self.arrived.contains(&b'\n') {
+                self.pass("line", us);
+            }
+            let end = self.arrived.iter().position(|byte| *byte == b'\n')?;
+            let line = String::from_utf8(self.arrived.drain(..=end).collect()).unwrap();
+            if line != "\n" {
+                return Some(line.trim_end().to_owned());
+            }
         }
-        let end = self.arrived.iter().position(|byte| *byte == b'\n')?;
-        let line = self.arrived.drain(..=end).collect();
-        Some(String::from_utf8(line).unwrap().trim_end().to_owned())
     }
 
     /// The next line must be `pattern`, in which `<ms>` is any number and `*HH` the right checksum.

@@ -10,7 +10,7 @@ use super::wire::{Answer, Identity, Outputs, Request, Setting};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -263,12 +263,14 @@ impl Worker {
         self.take_connection(connection);
         loop {
             self.move_on();
-            match inbox.recv_timeout(self.pause()) {
-                Ok(Message::End) | Err(RecvTimeoutError::Disconnected) => {
+            let first = inbox.recv_timeout(self.pause()).ok();
+            // Everything that is there comes before the clock: after a pause of this process, an answer that has long
+            // arrived is not asked for again.
+            for message in first.into_iter().chain(inbox.try_iter()) {
+                if matches!(message, Message::End) {
                     return self.say_goodbye();
                 }
-                Ok(message) => self.take_message(message),
-                Err(RecvTimeoutError::Timeout) => {}
+                self.take_message(message);
             }
         }
     }

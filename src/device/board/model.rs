@@ -56,14 +56,18 @@ impl BoardModel {
             only_checksummed: false,
             last_seq: None,
             partial: Vec::new(),
-            output: seal("! BOOT POWER"),
+            output: format!("\n{}", seal("! BOOT POWER")),
         }
     }
 
     /// The reset button: everything off, and only the settings are kept.
     pub fn reset(&mut self, now: Duration) {
         let settings = self.settings;
-        *self = Self { settings, output: seal("! BOOT RESET"), ..Self::new(self.lights, now) };
+        *self = Self {
+            settings,
+            output: format!("\n{}", seal("! BOOT RESET")),
+            ..Self::new(self.lights, now)
+        };
     }
 
     /// Lets time pass.
