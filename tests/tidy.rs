@@ -124,6 +124,7 @@ fn rooms_use_only_the_rooms_below_them() {
     check("simulate", &["cli", "report", "calibrate", "solve", "photometry"]);
     check("calibrate", &["cli", "simulate"]);
     check("report", &["cli", "simulate"]);
+    check("device", &["cli", "report", "calibrate", "simulate", "solution", "photometry"]);
 }
 
 #[test]
