@@ -24,6 +24,8 @@ pub(crate) struct Run<'a> {
     /// Per light and exposure: share in the mean, and variance per place of the 2 x 2 cell.
     weights: Vec<Vec<f64>>,
     exposure_variance: Vec<Vec<[VarianceModel; 4]>>,
+    /// Whether any light has more than one exposure.
+    several_exposures: bool,
     /// Per row parity and light: variance at even and odd columns with every exposure used.
     variance: [Vec<[VarianceModel; 2]>; 2],
 }
@@ -66,7 +68,16 @@ impl<'a> Run<'a> {
             all.map(|(of, weights)| variance_of_row(of, weights, parity, u64::MAX)).collect()
         });
         let normalizer = Normalizer::new(scene, &weights);
-        Self { scene, field, normalizer, method, weights, exposure_variance, variance }
+        Self {
+            scene,
+            field,
+            normalizer,
+            method,
+            several_exposures: weights.iter().any(|weights| weights.len() > 1),
+            weights,
+            exposure_variance,
+            variance,
+        }
     }
 
     /// Solves the whole picture on the current thread pool. `done` is told of every finished row.
@@ -140,7 +151,7 @@ impl<'a> Run<'a> {
         let row = mask.row(y);
         let (first, last) =
             (row.iter().position(|&inside| inside)?, row.iter().rposition(|&inside| inside)?);
-        let align = self.field.step().max(2);
+        let align = self.field.alignment();
         Some(first / align * align..last + 1)
     }
 
@@ -179,15 +190,18 @@ impl<'a> Run<'a> {
         if solver.solve(&input, &mut output, self.method).is_err() {
             output.outcome.fill(Outcome::TooFewLights);
         }
-        self.solve_incomplete(solver, rows, y, &input, &mut output);
+        if self.several_exposures {
+            self.solve_incomplete(solver, rows, y, &input, &mut output);
+        }
         if self.scene.layout == Layout::Rgb {
             albedo_of_channels(rows, &input.field, &output, &mut band.rgb[span]);
         }
-        for (column, outcome) in output.outcome.iter_mut().enumerate() {
-            if inside.is_some_and(|inside| !inside[column]) {
-                *outcome = Outcome::Masked;
+        if let Some(inside) = inside {
+            let outside = inside.iter().enumerate().filter(|(_, inside)| !**inside);
+            outside.for_each(|(column, _)| {
+                output.outcome[column] = Outcome::Masked;
                 rows.saturated[column] = false;
-            }
+            });
         }
         counts.add_row(output.outcome, output.residual);
         counts.outcomes[Outcome::Masked as usize] += self.scene.width - columns.len();

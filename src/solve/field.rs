@@ -1,13 +1,16 @@
 //! The light field: every light's vector where each pixel really looks, on a coarse grid in float64.
 
+use super::field_grid::node_grid;
 use crate::photometry::FieldRow;
 use nalgebra::{Point3, Vector3};
 use weavelight_calibration::description::{Camera, Light, Plane};
 use weavelight_calibration::irradiance::light_vector_in_rig;
 use weavelight_calibration::projection::Projector;
 
-/// The widest grid tried, pixels.
-const WIDEST_STEP: usize = 32;
+/// Grids tried, widest first, pixels between nodes.
+const STEPS: [usize; 11] = [32, 24, 20, 16, 12, 8, 6, 4, 3, 2, 1];
+/// Vectors held at most; a finer grid is computed row by row when it is reached.
+const MOST_VECTORS: usize = 6_000_000;
 /// How far linear interpolation between nodes may be off, relative to the vector's length: 1e-5 rad is 0.0006 deg.
 const INTERPOLATION_ERROR: f64 = 1e-5;
 /// Vectors shorter than this share of the light's longest are compared with it instead: their error does no harm.
@@ -22,6 +25,8 @@ pub(crate) struct LightField<'a> {
     width: usize,
     height: usize,
     step: usize,
+    /// Every node's vectors, row by row; `None` where they are too many.
+    grid: Option<Vec<[f64; 3]>>,
 }
 
 /// Where pixels look.
@@ -53,18 +58,33 @@ impl<'a> LightField<'a> {
             Some(camera) if !all_far => View::Plane { projector: Projector::new(camera), plane },
             _ => View::Anywhere,
         };
-        let mut field =
-            Self { lights, view, width: size_px.0, height: size_px.1, step: WIDEST_STEP };
-        while field.step > 1 && !field.is_accurate() {
-            field.step /= 2;
+        let (width, height) = size_px;
+        let mut field = Self { lights, view, width, height, step: 1, grid: None };
+        for step in STEPS {
+            field.step = step;
+            if step > 1 && field.is_accurate() {
+                break;
+            }
         }
         field.check_corners()?;
+        let vectors = field.nodes() * field.node_rows() * field.lights.len();
+        field.grid = (vectors <= MOST_VECTORS).then(|| node_grid(&field));
         Ok(field)
     }
 
     /// Pixels between nodes.
     pub(crate) fn step(&self) -> usize {
         self.step
+    }
+
+    /// The least columns to which a piece of a row can be aligned: on a node, at an even column.
+    pub(crate) fn alignment(&self) -> usize {
+        if self.step.is_multiple_of(2) { self.step } else { 2 * self.step }
+    }
+
+    /// Lights of the field.
+    pub(super) fn light_count(&self) -> usize {
+        self.lights.len()
     }
 
     /// Every light's vector at a pixel, exactly; `None` where the pixel shows no point of the plane.
@@ -127,12 +147,17 @@ impl<'a> LightField<'a> {
     }
 
     /// Nodes along a row: the last one stands at or beyond the last column.
-    fn nodes(&self) -> usize {
+    pub(super) fn nodes(&self) -> usize {
         (self.width - 1).div_ceil(self.step) + 1
     }
 
-    /// Vectors of node row `row`, node-major.
-    fn node_row(&self, row: usize) -> Vec<[f64; 3]> {
+    /// Rows of nodes: the last one stands at or beyond the last row.
+    pub(super) fn node_rows(&self) -> usize {
+        (self.height - 1).div_ceil(self.step) + 1
+    }
+
+    /// Vectors of node row `row`, node-major, each exactly.
+    pub(super) fn node_row(&self, row: usize) -> Vec<[f64; 3]> {
         let v = (row * self.step) as f64;
         let mut vectors = Vec::with_capacity(self.nodes() * self.lights.len());
         for node in 0..self.nodes() {
@@ -147,36 +172,33 @@ impl<'a> LightField<'a> {
     }
 }
 
-/// Walks down the rows of a band, computing each row of nodes when it is reached.
+/// Walks down the rows of a band.
 pub(crate) struct FieldRows<'f, 'a> {
     field: &'f LightField<'a>,
-    /// Index of the node row held in `above`.
-    index: Option<usize>,
-    above: Vec<[f64; 3]>,
-    below: Vec<[f64; 3]>,
+    /// Two rows of nodes and the index of the first, where the field does not hold them.
+    computed: Option<(usize, [Vec<[f64; 3]>; 2])>,
     row: Vec<[f64; 3]>,
 }
 
 impl<'f, 'a> FieldRows<'f, 'a> {
     pub(crate) fn new(field: &'f LightField<'a>) -> Self {
-        Self { field, index: None, above: vec![], below: vec![], row: vec![] }
+        Self { field, computed: None, row: vec![] }
     }
 
     /// Light vectors along picture row `y`, from column `first` (a multiple of the step) on.
     pub(crate) fn row(&mut self, y: usize, first: usize) -> FieldRow<'_> {
         let (index, offset) = (y / self.field.step, y % self.field.step);
-        self.reach(index);
         let weight = offset as f64 / self.field.step as f64;
-        let mix = |(a, b): (&[f64; 3], &[f64; 3])| {
-            [0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * weight)
-        };
-        self.row.clear();
-        if offset == 0 {
-            self.row.extend_from_slice(&self.above);
-        } else {
-            self.row.extend(self.above.iter().zip(&self.below).map(mix));
-        }
         let lights = self.field.lights.len();
+        let mut row = std::mem::take(&mut self.row);
+        if let Some(grid) = &self.field.grid {
+            let length = self.field.nodes() * lights;
+            let below = (index + 1).min(self.field.node_rows() - 1);
+            mix([index, below].map(|k| &grid[k * length..][..length]), weight, &mut row);
+        } else {
+            mix(self.computed_rows(index), weight, &mut row);
+        }
+        self.row = row;
         FieldRow {
             step: self.field.step,
             vectors: &self.row[first / self.field.step * lights..],
@@ -184,17 +206,24 @@ impl<'f, 'a> FieldRows<'f, 'a> {
         }
     }
 
-    fn reach(&mut self, index: usize) {
-        if self.index == Some(index) {
-            return;
-        }
-        if self.index.is_some_and(|held| held + 1 == index) && !self.below.is_empty() {
-            std::mem::swap(&mut self.above, &mut self.below);
-        } else {
-            self.above = self.field.node_row(index);
-        }
-        let is_last_row = index * self.field.step + 1 >= self.field.height;
-        self.below = if is_last_row { vec![] } else { self.field.node_row(index + 1) };
-        self.index = Some(index);
+    /// Node rows `index` and the next, computed where they are not at hand from the row before.
+    fn computed_rows(&mut self, index: usize) -> [&[[f64; 3]]; 2] {
+        let next = (index + 1).min(self.field.node_rows() - 1);
+        let rows = match self.computed.take() {
+            Some((held, rows)) if held == index => rows,
+            Some((held, [_, above])) if held + 1 == index => [above, self.field.node_row(next)],
+            _ => [index, next].map(|row| self.field.node_row(row)),
+        };
+        let (_, [above, below]) = self.computed.insert((index, rows));
+        [above, below]
     }
+}
+
+/// Linear between two rows of nodes.
+fn mix([above, below]: [&[[f64; 3]]; 2], weight: f64, out: &mut Vec<[f64; 3]>) {
+    out.clear();
+    let linear = |(a, b): (&[f64; 3], &[f64; 3])| {
+        [0, 1, 2].map(|axis| a[axis] + (b[axis] - a[axis]) * weight)
+    };
+    out.extend(above.iter().zip(below).map(linear));
 }

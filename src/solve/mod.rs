@@ -10,6 +10,7 @@ mod drift;
 mod encode;
 mod error;
 mod field;
+mod field_grid;
 mod finish;
 mod gain;
 mod in_memory;
