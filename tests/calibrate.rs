@@ -1,7 +1,11 @@
 //! Calibration from pictures of simulated targets, with effects that the fit does not know, and what it refuses.
 
 #![cfg(feature = "opencv")]
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test that cannot go on has failed and says so")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot go on has failed and says so"
+)]
 
 use std::path::{Path, PathBuf};
 use weavelight::calibrate::{

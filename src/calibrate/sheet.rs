@@ -76,9 +76,12 @@ pub(super) fn observe(
     let rects = grid(camera);
     let frames = average_all(session, camera, color, &rects, progress)?;
     still(session, &frames)?;
+    let exposures = Exposures { session, lights, frames: &frames, ambient: ambient(&frames) };
+    // Before anything is looked for in the pictures: a strip on an overexposed sheet is not found either.
+    exposures.check_complete()?;
+    exposures.check_saturation(rects.len())?;
     let pose = pose_of(session, camera, &frames)?;
     let cells = cells_on(camera, &pose, &rects, grid_size(camera));
-    let exposures = Exposures { session, lights, frames: &frames, ambient: ambient(&frames) };
     let mut warnings: Vec<String> = pose.warning.iter().cloned().collect();
     let sheet_cells = exposures.cells_of_the_sheet(&cells)?;
     exposures.check_levels(&sheet_cells, &mut warnings)?;
@@ -385,22 +388,26 @@ impl Exposures<'_> {
         Ok(kept)
     }
 
-    /// Missing, dead and overexposed lights are errors; a poor level is a warning.
+    /// Every light of the rig must have been photographed.
+    fn check_complete(&self) -> Result<(), CalibrateError> {
+        let missing: Vec<usize> =
+            (0..self.lights).filter(|l| self.of_light(*l).next().is_none()).collect();
+        if !missing.is_empty() {
+            let what = format!("no frame of light {missing:?}");
+            let remedy = "photograph this sheet under every light of the rig";
+            return Err(CalibrateError::target(self.session.manifest_path(), what, remedy));
+        }
+        Ok(())
+    }
+
+    /// A dead light is an error, a poor level a warning.
     fn check_levels(
         &self,
         cells: &[(usize, Cell)],
         warnings: &mut Vec<String>,
     ) -> Result<(), CalibrateError> {
         let place = || self.session.manifest_path();
-        let missing: Vec<usize> =
-            (0..self.lights).filter(|l| self.of_light(*l).next().is_none()).collect();
-        if !missing.is_empty() {
-            let what = format!("no frame of light {missing:?}");
-            let remedy = "photograph this sheet under every light of the rig";
-            return Err(CalibrateError::target(place(), what, remedy));
-        }
-        self.check_saturation(cells)?;
-        let mut levels: Vec<f64> = (0..self.lights).map(|l| self.level(l, cells)).collect();
+        let levels: Vec<f64> = (0..self.lights).map(|l| self.level(l, cells)).collect();
         let brightest = levels.iter().copied().fold(0.0, f64::max);
         let mut sorted = levels.clone();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -412,7 +419,14 @@ impl Exposures<'_> {
             let remedy = "check the LED, its wire and its channel in the rig file, and photograph this sheet again";
             return Err(CalibrateError::target(place(), what, remedy));
         }
-        levels.retain(|level| *level > GOOD_LEVEL[1]);
+        if brightest > GOOD_LEVEL[1] {
+            warnings.push(format!(
+                "{}: the brightest light reaches {:.0} % of full scale, close to clipping; expose {:.1} times shorter",
+                self.session.name,
+                100.0 * brightest,
+                brightest / 0.7
+            ));
+        }
         if brightest < GOOD_LEVEL[0] {
             warnings.push(format!(
                 "{}: the brightest light reaches {:.0} % of full scale; expose {:.1} times longer (50 to 90 % is best)",
@@ -424,11 +438,10 @@ impl Exposures<'_> {
         Ok(())
     }
 
-    fn check_saturation(&self, cells: &[(usize, Cell)]) -> Result<(), CalibrateError> {
+    fn check_saturation(&self, cells: usize) -> Result<(), CalibrateError> {
         for light in 0..self.lights {
             let share = |frame: &Averaged| {
-                cells.iter().map(|(k, _)| frame.cells[*k].saturated).sum::<f64>()
-                    / cells.len() as f64
+                frame.cells.iter().map(|cell| cell.saturated).sum::<f64>() / cells as f64
             };
             let least = self.of_light(light).map(share).fold(f64::INFINITY, f64::min);
             if least > OVEREXPOSED {
