@@ -95,6 +95,13 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
         };
         let observed = observe(&session, calibration.lights.len(), &camera, color, &part)?;
         report.warnings.extend(observed.warnings);
+        let pose_deg = observed.sheet.pose_sigma.tilt_rad.to_degrees();
+        if pose_deg > 0.5 * options.threshold_deg {
+            report.warnings.push(format!(
+                "{}: its printed strip gives the sheet's tilt to {pose_deg:.2} degrees only; state [plane] to check more closely",
+                session.name
+            ));
+        }
         let frame = (camera.width_px, camera.height_px);
         let solved = solve_sheet(&observed.sheet, &calibration, frame);
         let mut checked = describe(&observed.sheet, &solved, calibration.lights.len());

@@ -223,10 +223,25 @@ fn pose_of(
             Pose { plane: plane.clone(), sigma: exact, strip: Some((pose, shape)), warning }
         }
         (None, Some((pose, shape, sigma))) => {
-            Pose { plane: plane_of_board(&pose), sigma, strip: Some((pose, shape)), warning: None }
+            let (plane, sigma) = lying_or_found(plane_of_board(&pose), sigma);
+            Pose { plane, sigma, strip: Some((pose, shape)), warning: None }
         }
     })
 }
+
+/// A sheet whose strip agrees with the table lies on it: a narrow strip tells height and tilt far worse than that.
+fn lying_or_found(found: Plane, sigma: PoseSigma) -> (Plane, PoseSigma) {
+    let (tilt_deg, height_mm) = tilt_and_height(&found);
+    let lies = tilt_deg < LYING_TILT_DEG + 3.0 * sigma.tilt_rad.to_degrees()
+        && tilt_deg < LYING_MOST_DEG
+        && height_mm.abs() < LYING_HEIGHT_MM + 3.0 * sigma.offset_mm;
+    if lies { (Plane::table(), PoseSigma::default()) } else { (found, sigma) }
+}
+
+/// What a sheet on the table may seem to be off by beyond its strip's sigma, and the tilt that is never taken for none.
+const LYING_TILT_DEG: f64 = 0.3;
+const LYING_MOST_DEG: f64 = 4.0;
+const LYING_HEIGHT_MM: f64 = 2.0;
 
 /// Stated plane and strip may differ by this much before a word is said.
 const STATED_TOLERANCE_DEG: f64 = 0.5;
