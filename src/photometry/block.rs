@@ -24,6 +24,8 @@ pub(crate) const ZERO: Lanes = [0.0; LANES];
 pub(crate) struct Block {
     /// Photosites held; the lanes beyond are padding without a usable sample.
     pub(crate) len: usize,
+    /// Whether the lanes hold neighbours.
+    neighbours: bool,
     /// Where they stand in the row.
     pub(crate) column: [usize; LANES],
     /// Whether at an odd column (the row's second colour filter).
@@ -80,6 +82,7 @@ impl Block {
     ) {
         let start = columns.start;
         self.len = columns.len();
+        self.neighbours = true;
         for k in 0..LANES {
             self.column[k] = start + k;
             self.odd[k] = ((start + k) & 1) as u32;
@@ -91,9 +94,10 @@ impl Block {
         clean_scale(&mut self.noise_scale);
         let offset = self.offset(piece);
         for (i, sample) in self.sample.iter_mut().enumerate() {
-            let mut y = [f32::NAN; LANES];
-            copy_lanes(&mut y, &input.signal[i][columns.clone()]);
-            sample.set(&y);
+            match <&Lanes>::try_from(&input.signal[i][columns.clone()]) {
+                Ok(y) => sample.set(y),
+                Err(_) => sample.set_padded(&input.signal[i][columns.clone()]),
+            }
             let linear = &pieces.light[piece.first + i];
             for (axis, light) in sample.light.iter_mut().enumerate() {
                 let (a, b) = (linear.at_start[axis], linear.per_column[axis]);
@@ -108,6 +112,7 @@ impl Block {
     /// Loads photosites from anywhere in the row.
     pub(crate) fn gather(&mut self, input: &RowInput, pieces: &Pieces, places: &[Place]) {
         self.len = places.len();
+        self.neighbours = false;
         for (k, place) in places.iter().enumerate() {
             self.column[k] = place.column;
             self.odd[k] = (place.column & 1) as u32;
@@ -154,11 +159,24 @@ impl Block {
         }
     }
 
+    /// Gives every usable sample the weight 1.
+    pub(crate) fn weigh_equally(&mut self) {
+        for sample in &mut self.sample {
+            sample.weight = sample.usable;
+        }
+    }
+
     /// Lets every finite sample take part again.
     pub(crate) fn readmit(&mut self) {
         for sample in &mut self.sample {
             sample.usable = sample.finite;
         }
+    }
+
+    /// Whether all lanes hold neighbours in a row.
+    #[inline(always)]
+    pub(crate) fn is_run(&self) -> bool {
+        self.len == LANES && self.neighbours
     }
 
     /// Samples that lane `k` can use.
@@ -214,6 +232,14 @@ pub(crate) struct Place {
 }
 
 impl Sample {
+    /// A block's end that the row does not fill. Kept apart, or every block would be copied once more.
+    #[inline(never)]
+    fn set_padded(&mut self, values: &[f32]) {
+        let mut lanes = [f32::NAN; LANES];
+        lanes[..values.len()].copy_from_slice(values);
+        self.set(&lanes);
+    }
+
     #[inline(always)]
     fn set(&mut self, y: &Lanes) {
         for k in 0..LANES {

@@ -13,12 +13,11 @@ const NORMAL_EQUATIONS_CONDITION_SQUARED: f32 = 1000.0;
 
 /// Photosites of one piece, g = P y; carries those that have all their samples.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn solve_complete(block: &mut Block, pieces: &Pieces, piece: &Piece) -> Surface {
+pub(crate) fn solve_complete(block: &Block, pieces: &Pieces, piece: &Piece) -> Surface {
     let offset = block.offset(piece);
     let inverse = &pieces.inverse[piece.first..piece.first + block.sample.len()];
     let mut g = [ZERO; 3];
-    for (sample, linear) in block.sample.iter_mut().zip(inverse) {
-        sample.weight = sample.usable;
+    for (sample, linear) in block.sample.iter().zip(inverse) {
         let [px, py, pz] = columns(linear, &offset);
         let [gx, gy, gz] = &mut g;
         for k in 0..LANES {

@@ -37,8 +37,12 @@ pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting
     let mut sums = Sums { matrix: [ZERO; 6], right: [ZERO; 3], chi_square: ZERO, count: ZERO };
     let least = block.least_variance();
     for sample in &mut block.sample {
-        let mut residual = ZERO;
         let [lx, ly, lz] = &sample.light;
+        let (mut predicted, mut residual) = (ZERO, ZERO);
+        for k in 0..LANES {
+            predicted[k] = lx[k] * g[0][k] + ly[k] * g[1][k] + lz[k] * g[2][k];
+            residual[k] = sample.y[k] - predicted[k];
+        }
         match weighting {
             Weighting::Equal => sample.weight = sample.usable,
             Weighting::Kept => {}
@@ -52,7 +56,7 @@ pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting
             Weighting::Noise => {
                 let [even, odd] = sample.variance;
                 for k in 0..LANES {
-                    let predicted = lx[k] * g[0][k] + ly[k] * g[1][k] + lz[k] * g[2][k];
+                    let predicted = predicted[k];
                     let model = if block.odd[k] == 0 { even } else { odd };
                     let scale = block.noise_scale[k];
                     let variance = variance(model, predicted, scale).max(least[k]);
@@ -60,9 +64,6 @@ pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting
                     sample.weight[k] = if lit { sample.usable[k] / variance } else { 0.0 };
                 }
             }
-        }
-        for k in 0..LANES {
-            residual[k] = sample.y[k] - (lx[k] * g[0][k] + ly[k] * g[1][k] + lz[k] * g[2][k]);
         }
         sums.add(&sample.light, &sample.weight, &residual);
     }

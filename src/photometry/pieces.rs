@@ -7,13 +7,14 @@
 //!
 //! so the error that the mix makes on a Lambertian photosite is known exactly, and a piece is halved until it is small.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::reference::inverse_if_conditioned;
 use super::row::FieldRow;
 
-/// Largest error, relative to g, that interpolating pseudo-inverses may make (radians of the normal): 1.1e-4 degrees.
-const LARGEST_MIX_ERROR: f64 = 2e-6;
+/// Largest error, relative to g, that interpolating pseudo-inverses may make (radians of the normal): 4.6e-4 degrees, half of
+/// what the fast path may differ from the reference.
+const LARGEST_MIX_ERROR: f64 = 8e-6;
 
 /// Pieces are not cut below this many columns; what is still too curved then goes to float64.
 const SHORTEST_PIECE: usize = 8;
@@ -46,23 +47,35 @@ pub(crate) struct Pieces {
     pub(crate) light: Vec<Linear>,
     pub(crate) inverse: Vec<Linear>,
     pub(crate) unit: f64,
+    needs: Needs,
     left: Node,
     right: Node,
 }
 
-/// Light vectors and their pseudo-inverse at one column.
+/// What a method reads of the pieces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Needs {
+    /// Light vectors alone, which are linear anyway.
+    #[default]
+    Lights,
+    /// Pseudo-inverses too.
+    Inverse,
+}
+
+/// Light vectors and their pseudo-inverse at one column; plain arrays, because a row has a hundred nodes.
 #[derive(Clone, Default)]
 struct Node {
     column: usize,
-    light: Vec<Vector3<f64>>,
-    inverse: Vec<Vector3<f64>>,
+    light: Vec<[f64; 3]>,
+    inverse: Vec<[f64; 3]>,
     /// At least the condition number; infinite where the lights lie in a plane.
     condition: f64,
 }
 
 impl Pieces {
     /// Cuts a row of `width` columns.
-    pub(crate) fn cut(&mut self, field: &FieldRow, width: usize) {
+    pub(crate) fn cut(&mut self, field: &FieldRow, width: usize, needs: Needs) {
+        self.needs = needs;
         self.list.clear();
         self.light.clear();
         self.inverse.clear();
@@ -85,7 +98,8 @@ impl Pieces {
         }
         let conditioned = left.condition.max(right.condition) < FLOAT32_CONDITION;
         let length = right.column - left.column;
-        let straight = conditioned && mix_error(left, right) < LARGEST_MIX_ERROR;
+        let bent = |n: Needs| n == Needs::Inverse && mix_error(left, right) >= LARGEST_MIX_ERROR;
+        let straight = conditioned && !bent(self.needs);
         if straight || !conditioned || length < 2 * SHORTEST_PIECE {
             self.push(left, right, width, straight);
             return;
@@ -99,52 +113,59 @@ impl Pieces {
     fn push(&mut self, left: &Node, right: &Node, width: usize, float32: bool) {
         let (start, end) = (left.column, right.column.min(width));
         self.list.push(Piece { start, end, first: self.light.len(), float32 });
-        let columns = (right.column - left.column) as f64;
-        self.light.extend(
-            left.light.iter().zip(&right.light).map(|(a, b)| Linear::between(a, b, columns)),
-        );
-        self.inverse.extend(
-            left.inverse.iter().zip(&right.inverse).map(|(a, b)| Linear::between(a, b, columns)),
-        );
+        let per_column = 1.0 / (right.column - left.column) as f64;
+        let between = |a: &[[f64; 3]], b: &[[f64; 3]], to: &mut Vec<Linear>| {
+            to.extend(a.iter().zip(b).map(|(a, b)| Linear::between(a, b, per_column)));
+        };
+        between(&left.light, &right.light, &mut self.light);
+        between(&left.inverse, &right.inverse, &mut self.inverse);
     }
 }
 
 impl Linear {
-    fn between(a: &Vector3<f64>, b: &Vector3<f64>, columns: f64) -> Self {
-        let slope = (b - a) / columns;
-        Self { at_start: a.map(|v| v as f32).into(), per_column: slope.map(|v| v as f32).into() }
+    #[inline(always)]
+    fn between(a: &[f64; 3], b: &[f64; 3], per_column: f64) -> Self {
+        let slope = |axis: usize| ((b[axis] - a[axis]) * per_column) as f32;
+        Self { at_start: a.map(|v| v as f32), per_column: [slope(0), slope(1), slope(2)] }
     }
 }
 
 impl Node {
     fn place(&mut self, field: &FieldRow, column: usize, unit: f64) {
         self.column = column;
-        self.light.clear();
-        self.light.extend((0..field.lights).map(|i| field.at(column, i) / unit));
-        let normal_matrix: Matrix3<f64> =
-            self.light.iter().fold(Matrix3::zeros(), |sum, l| sum + l * l.transpose());
-        self.inverse.clear();
-        match inverse_if_conditioned(&normal_matrix) {
-            Some(inverse) => {
-                self.condition = (normal_matrix.trace() * inverse.trace()).sqrt();
-                self.inverse.extend(self.light.iter().map(|l| inverse * l));
-            }
-            None => {
-                self.condition = f64::INFINITY;
-                self.inverse.resize(self.light.len(), Vector3::zeros());
+        field.copy_at(column, 1.0 / unit, &mut self.light);
+        let mut sums = [0.0; 6];
+        for &[x, y, z] in &self.light {
+            for (sum, product) in sums.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
+                *sum += product;
             }
         }
+        let [xx, xy, xz, yy, yz, zz] = sums;
+        let inverse = inverse_if_conditioned(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
+        self.condition =
+            inverse.map_or(f64::INFINITY, |inverse| ((xx + yy + zz) * inverse.trace()).sqrt());
+        let inverse = inverse.unwrap_or_default();
+        let rows: [[f64; 3]; 3] =
+            [0, 1, 2].map(|r| [inverse[(r, 0)], inverse[(r, 1)], inverse[(r, 2)]]);
+        self.inverse.clear();
+        self.inverse.extend(
+            self.light.iter().map(|[x, y, z]| rows.map(|r| r[0] * x + r[1] * y + r[2] * z)),
+        );
     }
 }
 
 /// Norm of the 3 x 3 error at the middle, see the head of this file.
 fn mix_error(left: &Node, right: &Node) -> f64 {
-    let mut error = Matrix3::zeros();
-    for i in 0..left.light.len() {
-        error +=
-            (left.inverse[i] - right.inverse[i]) * (right.light[i] - left.light[i]).transpose();
+    let mut error = [[0.0; 3]; 3];
+    let lights = left.light.iter().zip(&right.light);
+    for ((p0, p1), (l0, l1)) in left.inverse.iter().zip(&right.inverse).zip(lights) {
+        for row in 0..3 {
+            for column in 0..3 {
+                error[row][column] += (p0[row] - p1[row]) * (l1[column] - l0[column]);
+            }
+        }
     }
-    error.norm() / 4.0
+    error.iter().flatten().map(|e| e * e).sum::<f64>().sqrt() / 4.0
 }
 
 /// The power of two at or below the longest component; 1 for a field without a finite non-zero number.

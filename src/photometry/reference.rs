@@ -285,9 +285,25 @@ pub(crate) fn inverse_if_conditioned(matrix: &Matrix3<f64>) -> Option<Matrix3<f6
     if !(scale > f64::MIN_POSITIVE && scale.is_finite()) {
         return None;
     }
-    let inverse = (matrix / scale).cholesky()?.inverse();
+    let inverse = inverse_by_factors(&(matrix / scale))?;
     let condition_squared = inverse.trace();
     (condition_squared < COPLANAR_CONDITION.powi(2)).then(|| inverse / scale)
+}
+
+/// Inverse of a symmetric positive matrix from its factors L D L^T; `None` where it is not positive.
+fn inverse_by_factors(m: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let (l21, l31) = (m[(1, 0)] / m[(0, 0)], m[(2, 0)] / m[(0, 0)]);
+    let d2 = m[(1, 1)] - l21 * m[(1, 0)];
+    let l32 = (m[(2, 1)] - l21 * m[(2, 0)]) / d2;
+    let d3 = m[(2, 2)] - l31 * m[(2, 0)] - l32 * l32 * d2;
+    if !(m[(0, 0)] > 0.0 && d2 > 0.0 && d3 > 0.0) {
+        return None;
+    }
+    let (r1, r2, r3) = (1.0 / m[(0, 0)], 1.0 / d2, 1.0 / d3);
+    let m31 = l21 * l32 - l31;
+    let (xy, xz, yz) = (-l21 * r2 - m31 * l32 * r3, m31 * r3, -l32 * r3);
+    let (xx, yy) = (r1 + l21 * l21 * r2 + m31 * m31 * r3, r2 + l32 * l32 * r3);
+    Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, r3))
 }
 
 /// Solves a row photosite by photosite, with the light vectors interpolated to each column. What the row's kernels are

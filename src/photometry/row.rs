@@ -43,6 +43,18 @@ impl FieldRow<'_> {
         a + (b - a) * t
     }
 
+    /// Vectors of all lights at a column, times `factor`.
+    pub(crate) fn copy_at(&self, column: usize, factor: f64, to: &mut Vec<[f64; 3]>) {
+        let (node, t) = self.place(column);
+        let last = self.nodes().saturating_sub(1);
+        let of_node = |node: usize| &self.vectors[node.min(last) * self.lights..][..self.lights];
+        let (a, b) = (of_node(node), of_node(node + 1));
+        to.clear();
+        to.extend(
+            a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|c| (a[c] + (b[c] - a[c]) * t) * factor)),
+        );
+    }
+
     /// Nodes of the row.
     pub fn nodes(&self) -> usize {
         self.vectors.len() / self.lights.max(1)

@@ -7,7 +7,7 @@ use multiversion::multiversion;
 use super::block::{Block, LANES, Place};
 use super::least_squares::{solve_complete, solve_masked};
 use super::method::Method;
-use super::pieces::Pieces;
+use super::pieces::{Needs, Pieces};
 use super::reference::solve_column;
 use super::robust::RobustSolver;
 use super::row::{Outcome, RowError, RowInput, RowOutput, check_shapes};
@@ -55,7 +55,8 @@ impl RowSolver {
         if output.outcome.is_empty() {
             return Ok(());
         }
-        self.pieces.cut(&input.field, output.outcome.len());
+        let needs = if method == Method::LeastSquares { Needs::Inverse } else { Needs::Lights };
+        self.pieces.cut(&input.field, output.outcome.len(), needs);
         self.block.reset(input);
         self.queues.masked.clear();
         self.queues.suspect.clear();
@@ -153,6 +154,9 @@ fn least_squares_of_block(
     block.load(input, pieces, &pieces.list[piece], columns);
     if block.is_dark() {
         return dark(block, output);
+    }
+    if output.kept.is_some() {
+        block.weigh_equally();
     }
     let surface = solve_complete(block, pieces, &pieces.list[piece]);
     surface.write(block, pieces.unit, output, |k, output| {

@@ -83,25 +83,67 @@ impl Surface {
             error_deg[k] = (relative * (180.0 / std::f32::consts::PI)).min(MOST_ERROR_DEG as f32);
             residual[k] = (self.squares[k].max(0.0) / self.count[k].max(1.0)).sqrt();
         }
+        let mut good = [true; LANES];
+        for k in 0..LANES {
+            let square = length[k] * length[k];
+            good[k] = self.carried[k]
+                & (square >= COMFORTABLE.start)
+                & (square < COMFORTABLE.end)
+                & (albedo[k] >= f32::MIN_POSITIVE)
+                & (albedo[k] < f32::MAX)
+                & (residual[k] < f32::MAX);
+        }
+        let solved = Solved { normal, albedo, error_deg, residual };
+        let mut plain = block.is_run() & output.kept.is_none();
+        for k in 0..LANES {
+            plain &= good[k] & (solved.normal[2][k] > 0.0);
+        }
+        if plain {
+            return self.write_run(block.column[0], &solved, output);
+        }
         for k in 0..block.len {
-            let column = block.column[k];
-            let in_range = COMFORTABLE.contains(&(length[k] * length[k]))
-                && (f32::MIN_POSITIVE..f32::MAX).contains(&albedo[k])
-                && residual[k] < f32::MAX;
-            if !(self.carried[k] && in_range) {
+            if !good[k] {
                 refused(k, output);
-            } else if normal[2][k] > 0.0 {
-                output.normal[column] = [normal[0][k], normal[1][k], normal[2][k]];
-                output.albedo[column] = albedo[k];
-                output.expected_error_deg[column] = error_deg[k];
-                output.residual[column] = residual[k];
-                output.outcome[column] = self.outcome[k];
-                if output.kept.is_some() {
-                    output.keep(column, block.kept(k));
-                }
+            } else if solved.normal[2][k] > 0.0 {
+                self.write_lane(block, k, &solved, output);
             } else {
-                output.clear(column, Outcome::NoSurface);
+                output.clear(block.column[k], Outcome::NoSurface);
             }
         }
     }
+
+    /// Writes a whole block of neighbours that are all solved.
+    #[inline(always)]
+    fn write_run(&self, start: usize, solved: &Solved, output: &mut RowOutput) {
+        let columns = start..start + LANES;
+        let [x, y, z] = &solved.normal;
+        for (k, normal) in output.normal[columns.clone()].iter_mut().enumerate() {
+            *normal = [x[k], y[k], z[k]];
+        }
+        output.albedo[columns.clone()].copy_from_slice(&solved.albedo);
+        output.expected_error_deg[columns.clone()].copy_from_slice(&solved.error_deg);
+        output.residual[columns.clone()].copy_from_slice(&solved.residual);
+        output.outcome[columns].copy_from_slice(&self.outcome);
+    }
+
+    fn write_lane(&self, block: &Block, k: usize, solved: &Solved, output: &mut RowOutput) {
+        let column = block.column[k];
+        let [x, y, z] = &solved.normal;
+        output.normal[column] = [x[k], y[k], z[k]];
+        output.albedo[column] = solved.albedo[k];
+        output.expected_error_deg[column] = solved.error_deg[k];
+        output.residual[column] = solved.residual[k];
+        output.outcome[column] = self.outcome[k];
+        if output.kept.is_some() {
+            output.keep(column, block.kept(k));
+        }
+    }
+}
+
+/// What a block is written from.
+struct Solved {
+    normal: [Lanes; 3],
+    albedo: Lanes,
+    error_deg: Lanes,
+    residual: Lanes,
 }
