@@ -3,12 +3,18 @@
 use rayon::prelude::*;
 use weavelight_calibration::description::{Cfa, Channel, Image};
 
+/// How much of the gradient correction is applied. Albedo has no shading in it: its channels rise together on cloth of
+/// one hue (where all of the correction is best) and against each other where yarns of different dyes meet (where none
+/// is). Over denim, linen, grey, tan on blue and red on green at 5 to 21 px a yarn, with a pixel of blur, half is never more
+/// than 1.4 times as far off as the better of the two, where none and all are up to 2.8 and 1.9 times.
+const CORRECTION: f32 = 0.5;
+
 /// Red, green and blue at every photosite of a white-balanced mosaic.
 ///
 /// `known` says which photosites have a value; the others come out as zero and lend nothing to their neighbours. Every
 /// photosite keeps its own value. Where the 5 x 5 neighbourhood is whole, the hidden channels come from linear
-/// interpolation corrected by the gradient of the channel that is there (Malvar, He and Cutler, "High-quality linear
-/// interpolation for demosaicing of Bayer-patterned color images", ICASSP 2004); elsewhere, and for patterns other than
+/// interpolation corrected by half the gradient of the channel that is there (after Malvar, He and Cutler, "High-quality
+/// linear interpolation for demosaicing of Bayer-patterned color images", ICASSP 2004); elsewhere, and for patterns other than
 /// Bayer's, from the known neighbours of that channel, the nearer the heavier. A photosite without any takes its own value.
 pub fn demosaic(
     mosaic: &Image<f32>,
@@ -104,7 +110,8 @@ impl Around<'_> {
 
     /// Green at red or blue.
     fn green(&self, own: f32) -> f32 {
-        (4.0 * own + 2.0 * (self.across(1) + self.along(1)) - self.across(2) - self.along(2)) / 8.0
+        let gradient = (4.0 * own - self.across(2) - self.along(2)) / 8.0;
+        (self.across(1) + self.along(1)) / 4.0 + CORRECTION * gradient
     }
 
     /// At green, the channel whose photosites are left and right of it (or above and below).
@@ -113,12 +120,14 @@ impl Around<'_> {
             true => (self.across(1), self.across(2), self.along(2)),
             false => (self.along(1), self.along(2), self.across(2)),
         };
-        (5.0 * own + 4.0 * near - far - self.corners() + 0.5 * sideways) / 8.0
+        let gradient = (5.0 * own - far - self.corners() + 0.5 * sideways) / 8.0;
+        near / 2.0 + CORRECTION * gradient
     }
 
     /// Blue at red, red at blue.
     fn opposite(&self, own: f32) -> f32 {
-        (6.0 * own + 2.0 * self.corners() - 1.5 * (self.across(2) + self.along(2))) / 8.0
+        let gradient = (6.0 * own - 1.5 * (self.across(2) + self.along(2))) / 8.0;
+        self.corners() / 4.0 + CORRECTION * gradient
     }
 }
 
@@ -252,16 +261,24 @@ mod tests {
         assert!(rgb.data.iter().flatten().all(|&value| value >= 0.0));
     }
 
-    /// Root mean square error of the hidden channels on a woven pattern, with the gradient correction and without.
-    fn errors_on_weave(yarn_px: f64) -> [f64; 2] {
-        let weave = |x: usize, y: usize| {
-            let (u, v) = (x as f64 / yarn_px, y as f64 / yarn_px);
+    /// Root mean square error of the hidden channels on a weave of two dyes with a pixel of blur, with the gradient
+    /// correction and without.
+    fn errors_on_weave(dyes: [[f64; 3]; 2], yarn_px: f64) -> [f64; 2] {
+        let sharp = |x: f64, y: f64| {
+            let (u, v) = (x / yarn_px, y / yarn_px);
             let warp_above = (u.floor() + v.floor()) as i64 % 2 == 0;
             let across = if warp_above { u.fract() } else { v.fract() };
-            // Two dyes; a yarn darkens towards its sides.
-            let shade = 1.0 - 3.0 * (across - 0.5).powi(2);
-            let dye = if warp_above { [0.25, 0.35, 0.6] } else { [0.7, 0.55, 0.35] };
-            dye.map(|value: f64| (value * shade) as f32)
+            let shade = 1.0 - 0.8 * (across - 0.5).powi(2);
+            dyes[usize::from(!warp_above)].map(|value| value * shade)
+        };
+        let weave = |x: usize, y: usize| {
+            let mut sum = [0.0; 3];
+            for (dx, dy) in (0..3).flat_map(|dy| (0..3).map(move |dx| (dx, dy))) {
+                let weight = [1.0, 2.0, 1.0][dx] * [1.0, 2.0, 1.0][dy] / 16.0;
+                let colour = sharp((x + dx) as f64, (y + dy) as f64);
+                sum.iter_mut().zip(colour).for_each(|(sum, value)| *sum += weight * value);
+            }
+            sum.map(|value| value as f32)
         };
         let mosaic = mosaic_of(120, 120, Cfa::RGGB, weave);
         let corrected = demosaic(&mosaic, Cfa::RGGB, &everywhere);
@@ -280,13 +297,21 @@ mod tests {
     }
 
     #[test]
-    fn the_gradient_correction_pays_on_coloured_weaves() {
-        for yarn_px in [5.3, 7.7, 12.1, 20.9] {
-            let [corrected, plain] = errors_on_weave(yarn_px);
-            assert!(
-                corrected < 0.9 * plain,
-                "{yarn_px} px: {corrected} corrected, {plain} averaged"
-            );
-        }
+    fn the_gradient_correction_gains_more_than_it_can_lose() {
+        let check = |dyes: [[f64; 3]; 2], most: f64| {
+            for yarn_px in [5.3, 9.1, 20.9] {
+                let [corrected, plain] = errors_on_weave(dyes, yarn_px);
+                let share = corrected / plain;
+                assert!(
+                    share < most,
+                    "{dyes:?}, {yarn_px} px: {corrected} corrected, {plain} averaged"
+                );
+            }
+        };
+        check([[0.06, 0.09, 0.2], [0.75, 0.73, 0.65]], 0.6);
+        check([[0.5, 0.45, 0.35], [0.6, 0.54, 0.43]], 0.6);
+        check([[0.2; 3], [0.6; 3]], 0.6);
+        check([[0.25, 0.35, 0.6], [0.7, 0.55, 0.35]], 1.45);
+        check([[0.6, 0.1, 0.1], [0.15, 0.45, 0.15]], 1.45);
     }
 }

@@ -237,7 +237,7 @@ impl Accumulator {
         colour: &mut [[f32; 3]],
     ) {
         let matrices: Vec<[Matrix3<f32>; 2]> =
-            (0..field.nodes()).map(|node| node_matrices(&field, node)).collect();
+            (0..2 * field.nodes() - 1).map(|half| matrices_at(&field, half)).collect();
         for x in 0..self.width {
             let at = y * self.width + x;
             let column = centre(x, self.scale, self.scene.width);
@@ -365,9 +365,12 @@ fn vector_at(field: &FieldRow, column: usize) -> [f32; 3] {
     [0, 1, 2].map(|axis| (a[axis] + (b[axis] - a[axis]) * t) as f32)
 }
 
-fn node_matrices(field: &FieldRow, node: usize) -> [Matrix3<f32>; 2] {
-    let vectors = &field.vectors[node * field.lights..(node + 1) * field.lights];
-    with_inverse(vectors.iter().map(|&l| Vector3::from(l) * Vector3::from(l).transpose()).sum())
+/// At a node, or half-way to the next: the inverse bends more than the vectors it is made of.
+fn matrices_at(field: &FieldRow, half_nodes: usize) -> [Matrix3<f32>; 2] {
+    let node = |node: usize| &field.vectors[node * field.lights..][..field.lights];
+    let (before, after) = (node(half_nodes / 2), node(half_nodes.div_ceil(2)));
+    let middle = |(a, b): (&[f64; 3], &[f64; 3])| (Vector3::from(*a) + Vector3::from(*b)) / 2.0;
+    with_inverse(before.iter().zip(after).map(middle).map(|l| l * l.transpose()).sum())
 }
 
 /// A matrix and its inverse; not a number where it has none.
@@ -376,8 +379,9 @@ fn with_inverse(n: Matrix3<f64>) -> [Matrix3<f32>; 2] {
     [n.cast(), inverse.cast()]
 }
 
-fn between(nodes: &[[Matrix3<f32>; 2]], step: usize, column: usize) -> [Matrix3<f32>; 2] {
-    let (node, t) = (column / step, (column % step) as f32 / step as f32);
-    let (a, b) = (&nodes[node], &nodes[(node + 1).min(nodes.len() - 1)]);
+/// Linear between the matrices at every half node.
+fn between(halves: &[[Matrix3<f32>; 2]], step: usize, column: usize) -> [Matrix3<f32>; 2] {
+    let (half, t) = (2 * column / step, (2 * column % step) as f32 / step as f32);
+    let (a, b) = (&halves[half], &halves[(half + 1).min(halves.len() - 1)]);
     [0, 1].map(|k| a[k] + (b[k] - a[k]) * t)
 }
