@@ -316,7 +316,7 @@ fn exposure_weights(variance: &[[VarianceModel; 4]]) -> Vec<f64> {
 }
 
 /// Variance at even and odd columns of a row, of the mean of those exposures whose bit is set.
-fn variance_of_row(
+pub(crate) fn variance_of_row(
     exposures: &[[VarianceModel; 4]],
     weights: &[f64],
     row_parity: usize,

@@ -3,6 +3,7 @@
 use super::SolveError;
 use super::bands::Run;
 use super::check::{check_frames, check_light_field};
+use super::estimate::noise_of_residuals;
 use super::field::{LightField, Unseen};
 use super::maps::Maps;
 use super::noise::{LinearNoise, full_scale};
@@ -31,7 +32,7 @@ pub fn solve_scene(
     check_frames(scene)?;
     let field = light_field(scene)?;
     let warnings = check_light_field(scene, &field)?;
-    let run = Run::new(scene, &field, noise(scene), method);
+    let run = Run::new(scene, &field, noise(scene, &field), method);
     let rows = AtomicUsize::new(0);
     let total = scene.height;
     let maps = run.solve(&|finished| {
@@ -72,13 +73,16 @@ pub(crate) fn unseen_pixel(scene: &Scene, unseen: Unseen) -> SolveError {
     }
 }
 
-/// The sensor's noise.
-pub(crate) fn noise(scene: &Scene) -> LinearNoise {
+/// The sensor's noise: as calibrated, else from the residuals of the pictures, else typical.
+pub(crate) fn noise(scene: &Scene, field: &LightField) -> LinearNoise {
     let range = full_scale(scene);
-    let typical = Noise {
-        electrons_per_dn: TYPICAL_FULL_WELL_E / range,
-        read_noise_e: TYPICAL_READ_NOISE_E,
-        kappa: TYPICAL_KAPPA,
-    };
-    LinearNoise::from_electrons(scene.color.noise.as_ref().unwrap_or(&typical), range)
+    if let Some(noise) = &scene.color.noise {
+        return LinearNoise::from_electrons(noise, range);
+    }
+    noise_of_residuals(scene, field).unwrap_or_else(|| {
+        let electrons_per_dn = TYPICAL_FULL_WELL_E / range;
+        let typical =
+            Noise { electrons_per_dn, read_noise_e: TYPICAL_READ_NOISE_E, kappa: TYPICAL_KAPPA };
+        LinearNoise::from_electrons(&typical, range)
+    })
 }

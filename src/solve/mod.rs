@@ -9,6 +9,7 @@ mod current;
 mod drift;
 mod encode;
 mod error;
+mod estimate;
 mod field;
 mod field_grid;
 mod finish;

@@ -37,7 +37,7 @@ fn check_against_reference(recipe: Recipe, method: Method) {
     let scene = scene(recipe);
     let maps = solve(&scene, method);
     let field = light_field(&scene).unwrap();
-    let run = Run::new(&scene, &field, noise(&scene), method);
+    let run = Run::new(&scene, &field, noise(&scene, &field), method);
     let (mut fitted, mut undecided, mut worst) = (0, 0, 0.0_f64);
     for y in 0..scene.height {
         for x in 0..scene.width {
@@ -170,4 +170,35 @@ fn lights_that_contradict_the_others_are_named() {
         });
     }
     check(&["With three lights nothing can tell"], &[], &|scene| scene.lights.truncate(3));
+}
+
+/// Adds the noise of a sensor to every frame: shot and read noise of `electrons_per_dn`, 4 electrons.
+fn add_noise(scene: &mut Scene, electrons_per_dn: f64) {
+    let mut dice = scenes::Dice(77);
+    // Twelve uniform numbers have variance one.
+    let mut gaussian = || (0..12).map(|_| dice.between(-0.5, 0.5)).sum::<f64>();
+    for light in &mut scene.lights {
+        let Samples::U16(samples) = &mut light.exposures[0].frame.samples else {
+            panic!("made of integers")
+        };
+        for sample in samples {
+            let electrons = (f64::from(*sample) - 600.0) * electrons_per_dn;
+            let noisy = electrons + (electrons.max(0.0) + 16.0).sqrt() * gaussian();
+            *sample = (600.0 + noisy / electrons_per_dn).round().clamp(0.0, 65_535.0) as u16;
+        }
+    }
+}
+
+#[test]
+fn noise_is_found_in_the_pictures_where_the_calibration_is_silent() {
+    let mut made = scene(Recipe { width: 200, height: 120, mm_per_px: 0.4, ..Recipe::default() });
+    let electrons_per_dn = 40_000.0 / 64_400.0;
+    add_noise(&mut made, electrons_per_dn);
+    made.color.noise = None;
+    let field = light_field(&made).unwrap();
+    let found = noise(&made, &field);
+    let shot = 1.0 / 40_000.0;
+    assert!((found.shot / shot - 1.0).abs() < 0.15, "{found:?}, shot noise is {shot:e}");
+    assert!(found.floor < 40.0 / 40_000.0_f64.powi(2), "{found:?}");
+    assert!(found.kappa < 0.004, "{found:?}");
 }
