@@ -68,8 +68,7 @@ pub(crate) fn still_current(
 ) -> Option<Report> {
     let report = Report::read(&out.join(REPORT_JSON)).ok()?;
     let there = |name: &&str| out.join(name).is_file();
-    let whole =
-        ALWAYS.iter().all(|name| there(name)) && (!with_page || there(&solution::REPORT_HTML));
+    let whole = ALWAYS.iter().all(there) && (!with_page || there(&solution::REPORT_HTML));
     let same = whole && report.key.as_deref() == Some(key);
     // Of a frame that was altered, reading it will tell.
     let unaltered =
