@@ -26,11 +26,27 @@ pub(crate) fn solve_complete(block: &Block, pieces: &Pieces, piece: &Piece) -> S
             gz[k] += pz[k] * sample.y[k];
         }
     }
+    unbend(&mut g, piece, &offset);
     let mut surface = describe(block, g, |i| columns(&inverse[i], &offset));
     for k in 0..LANES {
         surface.carried[k] = surface.count[k] == block.sample.len() as f32;
     }
     surface
+}
+
+/// Takes off what mixing the pseudo-inverses of the piece's ends adds: t (1 - t) (P0 - P1) (L1 - L0) g.
+#[inline(always)]
+fn unbend(g: &mut [Lanes; 3], piece: &Piece, offset: &Lanes) {
+    let [bx, by, bz] = &piece.bend;
+    let [gx, gy, gz] = g;
+    for k in 0..LANES {
+        let t = offset[k] * piece.per_column;
+        let share = t * (1.0 - t);
+        let (x, y, z) = (gx[k], gy[k], gz[k]);
+        gx[k] -= share * (bx[0] * x + bx[1] * y + bx[2] * z);
+        gy[k] -= share * (by[0] * x + by[1] * y + by[2] * z);
+        gz[k] -= share * (bz[0] * x + bz[1] * y + bz[2] * z);
+    }
 }
 
 /// Photosites with samples missing: normal equations over the others, refined once on the residual.

@@ -5,16 +5,17 @@
 //!
 //!   P(t) L(t) - I = t (1 - t) (P0 - P1) (L1 - L0),
 //!
-//! so the error that the mix makes on a Lambertian photosite is known exactly, and a piece is halved until it is small.
+//! so the error that the mix makes on a Lambertian photosite is known exactly: it is taken off to first order, and a piece is
+//! halved until what it does to the rest of the samples is small too.
 
 use nalgebra::Matrix3;
 
 use super::reference::inverse_if_conditioned;
 use super::row::FieldRow;
 
-/// Largest error, relative to g, that interpolating pseudo-inverses may make (radians of the normal): 4.6e-4 degrees, half of
-/// what the fast path may differ from the reference.
-const LARGEST_MIX_ERROR: f64 = 8e-6;
+/// Largest error, relative to g, that interpolating pseudo-inverses may make before it is taken off. What remains is its
+/// square, and its like on what is not Lambertian in the samples (at most half of them in effect): 0.0009 degrees.
+const LARGEST_MIX_ERROR: f64 = 3e-5;
 
 /// Pieces are not cut below this many columns; what is still too curved then goes to float64.
 const SHORTEST_PIECE: usize = 8;
@@ -37,6 +38,10 @@ pub(crate) struct Piece {
     pub(crate) first: usize,
     /// Whether float32 carries this piece.
     pub(crate) float32: bool,
+    /// 1 / columns between the nodes at its ends.
+    pub(crate) per_column: f32,
+    /// (P0 - P1) (L1 - L0).
+    pub(crate) bend: [[f32; 3]; 3],
 }
 
 /// The pieces of a row. Light vectors are divided by `unit`, a power of two near the longest, so that float32 neither
@@ -98,7 +103,8 @@ impl Pieces {
         }
         let conditioned = left.condition.max(right.condition) < FLOAT32_CONDITION;
         let length = right.column - left.column;
-        let bent = |n: Needs| n == Needs::Inverse && mix_error(left, right) >= LARGEST_MIX_ERROR;
+        let bent =
+            |n: Needs| n == Needs::Inverse && mix_error(&bend(left, right)) >= LARGEST_MIX_ERROR;
         let straight = conditioned && !bent(self.needs);
         if straight || !conditioned || length < 2 * SHORTEST_PIECE {
             self.push(left, right, width, straight);
@@ -112,8 +118,10 @@ impl Pieces {
 
     fn push(&mut self, left: &Node, right: &Node, width: usize, float32: bool) {
         let (start, end) = (left.column, right.column.min(width));
-        self.list.push(Piece { start, end, first: self.light.len(), float32 });
         let per_column = 1.0 / (right.column - left.column) as f64;
+        let bend = bend(left, right).map(|row| row.map(|v| v as f32));
+        let first = self.light.len();
+        self.list.push(Piece { start, end, first, float32, per_column: per_column as f32, bend });
         let between = |a: &[[f64; 3]], b: &[[f64; 3]], to: &mut Vec<Linear>| {
             to.extend(a.iter().zip(b).map(|(a, b)| Linear::between(a, b, per_column)));
         };
@@ -154,18 +162,23 @@ impl Node {
     }
 }
 
-/// Norm of the 3 x 3 error at the middle, see the head of this file.
-fn mix_error(left: &Node, right: &Node) -> f64 {
-    let mut error = [[0.0; 3]; 3];
+/// (P0 - P1) (L1 - L0), see the head of this file.
+fn bend(left: &Node, right: &Node) -> [[f64; 3]; 3] {
+    let mut bend = [[0.0; 3]; 3];
     let lights = left.light.iter().zip(&right.light);
     for ((p0, p1), (l0, l1)) in left.inverse.iter().zip(&right.inverse).zip(lights) {
         for row in 0..3 {
             for column in 0..3 {
-                error[row][column] += (p0[row] - p1[row]) * (l1[column] - l0[column]);
+                bend[row][column] += (p0[row] - p1[row]) * (l1[column] - l0[column]);
             }
         }
     }
-    error.iter().flatten().map(|e| e * e).sum::<f64>().sqrt() / 4.0
+    bend
+}
+
+/// Norm of the mix's error in the middle of a piece.
+fn mix_error(bend: &[[f64; 3]; 3]) -> f64 {
+    bend.iter().flatten().map(|e| e * e).sum::<f64>().sqrt() / 4.0
 }
 
 /// The power of two at or below the longest component; 1 for a field without a finite non-zero number.
