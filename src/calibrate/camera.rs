@@ -212,7 +212,7 @@ fn none_found(pictures: &[Picture], shape: &BoardShape) -> CalibrateError {
 
 fn other_size(picture: &Picture, shape: &BoardShape) -> Option<[usize; 2]> {
     let grey = grey_picture(&read_frame(picture.session, picture.entry).ok()?);
-    let near = |n: usize| [n.wrapping_sub(1), n, n + 1, n.wrapping_sub(2), n + 2];
+    let near = |n: usize| [n.wrapping_sub(1), n, n + 1];
     let sizes = near(shape.columns).into_iter().flat_map(|c| near(shape.rows).map(|r| [c, r]));
     let possible = sizes.filter(|size| size.iter().all(|n| (3..100).contains(n)));
     let shows = |[columns, rows]: &[usize; 2]| {
