@@ -130,8 +130,12 @@ fn rooms_use_only_the_rooms_below_them() {
 #[test]
 fn the_kernels_do_no_input_or_output() {
     let words = ["std::fs", "std::io", "std::thread", "std::time", "rayon", "tracing::"];
-    expect_none("src/photometry: data in, data out", &mentions("src/photometry", &words));
-    expect_none("calibration: data in, data out", &mentions("calibration/src", &words));
+    // Their tests may read pictures.
+    let kernels = |folder: &str| -> Vec<String> {
+        mentions(folder, &words).into_iter().filter(|place| !place.contains("/tests/")).collect()
+    };
+    expect_none("src/photometry: data in, data out", &kernels("src/photometry"));
+    expect_none("calibration: data in, data out", &kernels("calibration/src"));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 /// Say what of the machine and the instrument is there and usable
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  weavelight doctor\n  weavelight doctor --rig rig.toml")]
+#[command(after_help = "Example:\n  weavelight doctor\n  weavelight doctor --rig rig.toml")]
 pub(super) struct Args {
     /// Folder that outputs would go to
     #[arg(long, value_name = "DIR", default_value = ".")]
