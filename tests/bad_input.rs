@@ -1,6 +1,13 @@
 //! Bad input to the whole program: exit status 1 or 2, one or two lines that name the file and the remedy, no backtrace,
 //! nothing half-written.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    reason = "a test that cannot set its scene up has failed; figures are to be seen"
+)]
+
 mod support;
 
 use std::fs;
@@ -154,7 +161,7 @@ fn lights() {
                     h.write(
                         "c/lights.toml",
                         lights_toml(&[LIGHTS[0], LIGHTS[1], LIGHTS[0], LIGHTS[1]]),
-                    )
+                    );
                 },
                 &["light"],
             ),

@@ -147,9 +147,9 @@ fn check_refused(
     );
 }
 
-fn edit(path: PathBuf, change: impl Fn(&str) -> String) {
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, change(&text)).unwrap();
+fn edit(path: impl AsRef<Path>, change: impl Fn(&str) -> String) {
+    let text = std::fs::read_to_string(path.as_ref()).unwrap();
+    std::fs::write(path, change(&text)).unwrap();
 }
 
 #[test]
@@ -197,7 +197,7 @@ fn boards_that_say_nothing_are_refused() {
     };
     let manifest = rig_folder.join("board/session.toml");
     let good = std::fs::read_to_string(&manifest).unwrap();
-    edit(manifest.clone(), |text| {
+    edit(&manifest, |text| {
         text.replace("columns = 9", "columns = 8").replace("rows = 6", "rows = 7")
     });
     let message = camera();

@@ -33,7 +33,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Demo(demo::Args),
-    Simulate(simulate::Args),
+    Simulate(Box<simulate::Args>),
     Solve(solve::Args),
     Import(import::Args),
     Calibrate(calibrate::Args),

@@ -70,7 +70,7 @@ impl RowSolver {
                     self.neighbours(index, input, output, least_squares_of_block);
                 }
                 Method::Weighted | Method::Auto => {
-                    self.neighbours(index, input, output, weighted_of_block)
+                    self.neighbours(index, input, output, weighted_of_block);
                 }
                 Method::Robust => {
                     self.queues.suspect.extend(

@@ -87,8 +87,7 @@ impl Surface {
         for k in 0..LANES {
             let square = length[k] * length[k];
             good[k] = self.carried[k]
-                & (square >= COMFORTABLE.start)
-                & (square < COMFORTABLE.end)
+                & COMFORTABLE.contains(&square)
                 & (albedo[k] >= f32::MIN_POSITIVE)
                 & (albedo[k] < f32::MAX)
                 & (residual[k] < f32::MAX);

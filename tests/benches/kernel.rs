@@ -219,7 +219,7 @@ fn solve(band: &Band, output: &mut Output, method: Method) {
         || Buffers::new(band),
         |buffers, (row, mut out)| {
             with_row(band, row, buffers, |solver, input| {
-                solver.solve(input, &mut out, method).unwrap()
+                solver.solve(input, &mut out, method).unwrap();
             });
         },
     );
@@ -231,7 +231,7 @@ fn normal_equations(band: &Band, output: &mut Output, thin: usize) {
         || Buffers::new(band),
         |buffers, (row, mut out)| {
             with_row(band, row, buffers, |_, input| {
-                reference_row(input, &mut out, Method::LeastSquares)
+                reference_row(input, &mut out, Method::LeastSquares);
             });
         },
     );
@@ -376,7 +376,7 @@ fn megapixels(repeats: usize, rows: usize) {
         let lines = vec![
             line("touch once", |out| repeated(&|out| touch(&band, out), out)),
             line("least squares", |out| {
-                repeated(&|out| solve(&band, out, Method::LeastSquares), out)
+                repeated(&|out| solve(&band, out, Method::LeastSquares), out);
             }),
             line("auto, 1 % failing", |out| repeated(&|out| solve(&band, out, Method::Auto), out)),
         ];
@@ -390,8 +390,8 @@ fn main() {
     let full = arguments.iter().any(|a| a == "--bench");
     let (repeats, rows) = if full { (5, 256) } else { (1, 4) };
     println!("{} threads, bands of {WIDTH} x {rows}", rayon::current_num_threads());
-    let tables: [(&str, fn(usize, usize)); 3] =
-        [("methods", methods), ("lights", lights), ("megapixels", megapixels)];
+    type Table = (&'static str, fn(usize, usize));
+    let tables: [Table; 3] = [("methods", methods), ("lights", lights), ("megapixels", megapixels)];
     let named = |name: &str| arguments.iter().any(|a| a == name);
     let all = !tables.iter().any(|(name, _)| named(name));
     for (name, table) in tables {

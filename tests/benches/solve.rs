@@ -282,14 +282,14 @@ fn expose(camera: &Camera, lamp: &PointLight, index: usize) -> Exposure {
         let mut random = (y * LIGHTS + index) as u64;
         for start in (0..width).step_by(16) {
             let (a, b) = (vector(start), vector(start + 16));
-            for x in start..(start + 16).min(width) {
+            for (x, sample) in row.iter_mut().enumerate().skip(start).take(16) {
                 let l = a + (b - a) * ((x - start) as f64 / 16.0);
                 let shading = l.dot(&normal(x, y)).max(0.0);
                 let channel = Cfa::RGGB.channel(x, y) as usize;
                 let electrons =
                     40_000.0 * albedo(x, y)[channel] * shading * lamp.intensity[channel];
                 let noisy = electrons + (electrons + 16.0).sqrt() * gaussian(&mut random);
-                row[x] = (BLACK + noisy / ELECTRONS_PER_DN).round().clamp(0.0, SATURATION) as u16;
+                *sample = (BLACK + noisy / ELECTRONS_PER_DN).round().clamp(0.0, SATURATION) as u16;
             }
         }
     });
@@ -311,7 +311,7 @@ fn normal(x: usize, y: usize) -> Vector3<f64> {
 }
 
 fn albedo(x: usize, y: usize) -> [f64; 3] {
-    if (x / 20 + y / 20) % 2 == 0 { [0.6, 0.3, 0.15] } else { [0.2, 0.5, 0.7] }
+    if (x / 20 + y / 20).is_multiple_of(2) { [0.6, 0.3, 0.15] } else { [0.2, 0.5, 0.7] }
 }
 
 /// Sum of four uniform numbers, scaled to variance 1.

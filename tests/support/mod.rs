@@ -34,8 +34,8 @@ impl Home {
         for (k, light) in lights.iter().enumerate() {
             write_frame(&home.path(&format!("s/light-{k}.png")), *light, WIDTH, HEIGHT);
         }
-        home.write("s/session.toml", &manifest(lights.len(), &home.path("s")));
-        home.write("c/lights.toml", &lights_toml(lights));
+        home.write("s/session.toml", manifest(lights.len(), &home.path("s")));
+        home.write("c/lights.toml", lights_toml(lights));
         home.write("c/color.toml", "schema = 1\nresponse = [0, 1]\n");
         home
     }

@@ -105,7 +105,8 @@ fn find_among(ports: &[PathBuf], origin: Instant) -> Result<Connection, BoardErr
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use crate::device::board::BoardModel;

@@ -340,7 +340,8 @@ fn each_failure_has_its_name() {
     let usable = |count: usize| {
         (0..10).map(|i| if i < count { lights[i].z as f32 } else { f32::NAN }).collect()
     };
-    let cases: [(&str, &[Vector3<f64>], Vec<f32>, &[Outcome]); 9] = [
+    type Case<'a> = (&'a str, &'a [Vector3<f64>], Vec<f32>, &'a [Outcome]);
+    let cases: [Case; 9] = [
         ("all black", &lights, vec![0.0; 10], &[Outcome::NoSurface]),
         ("all negative zero", &lights, vec![-0.0; 10], &[Outcome::NoSurface]),
         ("all saturated", &lights, vec![f32::NAN; 10], &[Outcome::TooFewLights]),
