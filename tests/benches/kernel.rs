@@ -85,8 +85,9 @@ impl Band {
     /// Wavy cloth; the share `failing` of the photosites has one sample in shadow or in a highlight.
     fn new(lights: usize, rows: usize, failing: f64) -> Self {
         let positions = light_positions(lights);
-        let field =
-            [field_row(&positions, 10.0), field_row(&positions, 10.0 + 0.085 * rows as f64)];
+        // The same at both ends: the samples below are made with one row's light vectors.
+        let row = field_row(&positions, 10.0);
+        let field = [row.clone(), row];
         let mut random = Random(0x9e37_79b9_7f4a_7c15);
         let mut frames = vec![vec![0_u16; rows * WIDTH]; lights];
         let nodes = FieldRow { step: STEP, vectors: &field[0], lights };
