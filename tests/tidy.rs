@@ -121,10 +121,11 @@ fn rooms_use_only_the_rooms_below_them() {
     );
     check("solution", &["cli", "report", "calibrate", "solve", "simulate", "photometry"]);
     check("solve", &["cli", "report", "calibrate", "simulate"]);
-    check("simulate", &["cli", "report", "calibrate", "solve", "photometry"]);
+    check("simulate", &["cli", "report", "calibrate", "solve", "photometry", "device"]);
     check("calibrate", &["cli", "simulate"]);
     check("report", &["cli", "simulate"]);
-    check("device", &["cli", "report", "calibrate", "simulate", "solution", "photometry"]);
+    // The simulated camera photographs with the simulated rig's instrument.
+    check("device", &["cli", "report", "calibrate", "solution", "photometry"]);
 }
 
 #[test]

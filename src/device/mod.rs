@@ -1,3 +1,4 @@
-//! What a capture needs of the world outside: the light board.
+//! What a capture needs of the world outside: the light board and the camera, and the sequence that scans.
 
 pub mod board;
+pub mod camera;

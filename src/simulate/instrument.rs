@@ -1,4 +1,4 @@
-use super::{Options, SimulateError};
+use super::{Options, Scene, SimulateError};
 use crate::files::{Provenance, sha256_of_file};
 use crate::instrument::{
     CalibratedLight, CameraKind, Color, Controller, Noise, Rig, RigCamera, RigLight, RigLightPlace,
@@ -49,6 +49,11 @@ impl Instrument {
         if let Some([width, height]) = options.size_px {
             resize(&mut rig.camera, width, height);
         }
+        Self::of_rig(rig, options)
+    }
+
+    /// The instrument that `rig` is in truth; of the options count the seed, what is wrong, and names for messages.
+    pub(super) fn of_rig(rig: Rig, options: &Options) -> Result<Self, SimulateError> {
         check_size(options, &rig.camera)?;
         let nominal = nominal_camera(&rig.camera);
         let stage = Stage {
@@ -88,6 +93,7 @@ impl Instrument {
     pub(super) fn write(&self, options: &Options, folder: &Path) -> Result<(), SimulateError> {
         let rig_path = folder.join("rig.toml");
         self.rig.save(&rig_path)?;
+        Scene::of(options, self).save(folder)?;
         let input =
             crate::files::Input { name: "rig.toml".to_owned(), sha256: sha256_of_file(&rig_path)? };
         let mut quality = toml::Table::new();

@@ -1,7 +1,7 @@
 //! The simulated rig's folders: what a user of the real rig would have after photographing a fabric and every
 //! calibration target, and the truth beside it.
 //!
-//! `--out DIR` then holds `rig.toml` (what the technician knows), `calibration/` (the truth), `board/`, `grey/`,
+//! `--out DIR` then holds `rig.toml` (what the technician knows), `scene.toml` (what the simulated camera sees in a scan), `calibration/` (the truth), `board/`, `grey/`,
 //! `white-flat/`, `white-raised/`, `white-tilt-N/`, `swatch/` and `truth/` (unit mean normal, mean albedo and mean height
 //! over each photosite's footprint, on the sensor's own grid; heights count from the swatch's plane).
 
@@ -9,6 +9,7 @@ mod error;
 mod instrument;
 mod options;
 mod parts;
+mod scene;
 mod targets;
 mod truth;
 mod write;
@@ -16,6 +17,7 @@ mod write;
 pub use error::SimulateError;
 pub use instrument::Instrument;
 pub use options::{Flaws, Material, Options, Part, Targets};
+pub use scene::{SCENE_FILE, Scene};
 
 use crate::files::{OutputKind, StagedFolder};
 use parts::Studio;
@@ -25,7 +27,16 @@ use std::path::PathBuf;
 const OUTPUT: OutputKind = OutputKind {
     name: "simulation",
     marker: Some("rig.toml"),
-    members: &["rig.toml", "calibration", "board", "grey", "white-*", "swatch", "truth"],
+    members: &[
+        "rig.toml",
+        SCENE_FILE,
+        "calibration",
+        "board",
+        "grey",
+        "white-*",
+        "swatch",
+        "truth",
+    ],
 };
 
 /// What was written.

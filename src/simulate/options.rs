@@ -222,6 +222,18 @@ impl Default for Flaws {
     }
 }
 
+impl Flaws {
+    /// The light that shines when `light` is switched on: another one where wires are swapped, `None` where it is dead.
+    pub fn light_that_shines(&self, light: usize) -> Option<usize> {
+        let wired = match self.swapped {
+            Some([a, b]) if light == a => b,
+            Some([a, b]) if light == b => a,
+            _ => light,
+        };
+        Some(wired).filter(|light| self.dead != Some(*light))
+    }
+}
+
 impl Options {
     /// Whether a part was asked for.
     pub fn wants(&self, part: Part) -> bool {

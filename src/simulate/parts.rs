@@ -236,14 +236,8 @@ impl Studio<'_> {
 
     /// What really happens when a light is asked for.
     fn shot(&self, plan: &PartPlan, k: usize, light: Option<usize>, exposure: f64) -> Shot {
-        let flaws = &self.options.flaws;
-        let wired = light.map(|light| match flaws.swapped {
-            Some([a, b]) if light == a => b,
-            Some([a, b]) if light == b => a,
-            _ => light,
-        });
         Shot {
-            light: wired.filter(|light| flaws.dead != Some(*light)),
+            light: light.and_then(|light| self.options.flaws.light_that_shines(light)),
             exposure,
             strength: 1.0,
             number: plan.index as u64 * SHOTS_PER_PART + k as u64,
