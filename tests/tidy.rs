@@ -126,6 +126,15 @@ fn rooms_use_only_the_rooms_below_them() {
     check("report", &["cli", "simulate"]);
     // The simulated camera photographs with the simulated rig's instrument.
     check("device", &["cli", "report", "calibrate", "solution", "photometry"]);
+    check("bench", &["cli", "report", "calibrate", "device", "demo"]);
+    // Measuring is for the command line alone.
+    for file in files_below("src", "rs") {
+        let path = file.strip_prefix(root()).unwrap().to_owned();
+        if !path.starts_with("src/bench") && !path.starts_with("src/cli") {
+            let text = fs::read_to_string(&file).unwrap();
+            assert!(!text.contains("crate::bench"), "{} uses crate::bench", path.display());
+        }
+    }
 }
 
 #[test]

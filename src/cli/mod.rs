@@ -2,6 +2,7 @@
 //!
 //! Exit status: 0 done, 1 the work failed, 2 the call was wrong.
 
+mod bench;
 mod calibrate;
 mod compare;
 mod demo;
@@ -38,6 +39,7 @@ enum Command {
     Import(import::Args),
     Calibrate(calibrate::Args),
     Compare(compare::Args),
+    Bench(bench::Args),
     Doctor(doctor::Args),
     Gui(gui::Args),
 }
@@ -51,6 +53,7 @@ impl Command {
             Command::Import(args) => import::run(args),
             Command::Calibrate(args) => calibrate::run(args),
             Command::Compare(args) => compare::run(args),
+            Command::Bench(args) => bench::run(args),
             Command::Doctor(args) => doctor::run(args),
             Command::Gui(args) => gui::run(args),
         }

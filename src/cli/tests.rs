@@ -47,6 +47,14 @@ fn calls_are_understood_or_refused() {
     check("weavelight solve s --calibration c --out m --method best", false);
     check("weavelight solve s --out m", false);
     check("weavelight solve s --calibration c --out m --threads 0", false);
+    check("weavelight bench", true);
+    check(
+        "weavelight bench --quick --curves --set a=s,s/calibration,n.exr --set b=t,c,n.exr",
+        true,
+    );
+    check("weavelight bench --no-fabrics --set a=s,c", false);
+    check("weavelight bench --set s,c,n.exr", false);
+    check("weavelight bench --set a=s,,n.exr", false);
     check("weavelight demo", true);
     check("weavelight demo --out d --size 64x48", true);
     check("weavelight demo --size big", false);

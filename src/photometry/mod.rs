@@ -36,5 +36,6 @@ pub use method::{MAX_LIGHTS, Method};
 pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};
 pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
+pub(crate) use reference::{inverse_if_conditioned, variance};
 pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, VarianceModel};
 pub use solve_row::RowSolver;

@@ -17,9 +17,9 @@ const BAND_ROWS: usize = 64;
 
 /// A scene with everything that its rows share.
 pub(crate) struct Run<'a> {
-    scene: &'a Scene,
-    field: &'a LightField<'a>,
-    normalizer: Normalizer<'a>,
+    pub(super) scene: &'a Scene,
+    pub(super) field: &'a LightField<'a>,
+    pub(super) normalizer: Normalizer<'a>,
     method: Method,
     /// Per light and exposure: share in the mean, and variance per place of the 2 x 2 cell.
     weights: Vec<Vec<f64>>,
@@ -27,7 +27,7 @@ pub(crate) struct Run<'a> {
     /// Whether any light has more than one exposure.
     several_exposures: bool,
     /// Per row parity and light: variance at even and odd columns with every exposure used.
-    variance: [Vec<[VarianceModel; 2]>; 2],
+    pub(super) variance: [Vec<[VarianceModel; 2]>; 2],
 }
 
 /// Mutable parts of the maps that one band owns.

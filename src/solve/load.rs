@@ -1,6 +1,7 @@
 //! From two folders to a scene in memory.
 
 use super::drift::drift_warnings;
+use super::in_memory::leave_out_dark_lights;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
@@ -22,6 +23,19 @@ const MOST_EXPOSURES: usize = 64;
 pub(crate) struct Loaded {
     pub(crate) scene: Scene,
     pub(crate) warnings: Vec<String>,
+}
+
+/// A capture session with its calibration as [`super::run`] solves it: lights that add nothing left out. With the scene come
+/// the warnings.
+///
+/// # Errors
+/// As [`super::run`].
+pub fn load_scene(session: &Path, calibration: &Path) -> Result<(Scene, Vec<String>), SolveError> {
+    let options = Options::new(session, calibration, "");
+    let (session, calibration) = (Session::load(session)?, Calibration::load(calibration)?);
+    let Loaded { mut scene, mut warnings } = load(&options, &session, calibration, &|_| {})?;
+    warnings.extend(leave_out_dark_lights(&mut scene)?);
+    Ok((scene, warnings))
 }
 
 /// Reads and checks everything that can be checked before solving.

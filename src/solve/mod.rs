@@ -23,6 +23,7 @@ pub mod preview;
 mod progress;
 #[cfg(test)]
 mod reference;
+mod rows;
 mod run;
 mod scene;
 mod sensor;
@@ -34,8 +35,10 @@ mod witness;
 pub use error::SolveError;
 pub use finish::Finished;
 pub use in_memory::{leave_out_dark_lights, solve_scene};
+pub use load::load_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 pub use options::{Grid, NormalY, Options, Reuse};
 pub use progress::{Progress, Stage};
+pub use rows::Rows;
 pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};

@@ -6,11 +6,11 @@ use super::bands::Run;
 use super::in_memory::{light_field, noise};
 use super::reference::solve_exactly;
 use super::*;
-use crate::photometry::{Method, Outcome, Pixel};
+use crate::photometry::{Method, Outcome, Pixel, RowSolver};
 use crate::raw::{Layout, Samples};
 use nalgebra::Vector3;
 use scenes::{Recipe, albedo_at, normal_at, scene};
-use weavelight_calibration::description::Cfa;
+use weavelight_calibration::description::{Cfa, Image};
 
 /// What the project asks of the fast path against float64 evaluated at every pixel.
 const SAME_NORMAL_DEG: f64 = 1e-3;
@@ -206,4 +206,38 @@ fn noise_is_found_in_the_pictures_where_the_calibration_is_silent() {
         );
     }
     assert!(found.kappa < 0.004, "{found:?}");
+}
+
+/// What estimators from elsewhere are handed is what the run solves: its own kernel finds the same there.
+#[test]
+fn rows_hold_what_the_run_solves() {
+    let plain = Recipe::default();
+    let all = Recipe { gain_maps: true, ambient: true, bent_response: true, ..plain };
+    for recipe in
+        [all, Recipe { layout: Layout::Rgb, ..all }, Recipe { directional: true, ..plain }]
+    {
+        let mut scene = scene(recipe);
+        let data = (0..scene.width * scene.height).map(|place| place % 7 > 1).collect();
+        scene.mask = Some(Image { width: scene.width, height: scene.height, data });
+        let maps = solve(&scene, Method::Weighted);
+        let by_rows = |step: usize| {
+            Rows::with(&scene, |rows| {
+                rows.solve(step, &|input, output| {
+                    RowSolver::new().solve(input, output, Method::Weighted).unwrap();
+                })
+            })
+            .unwrap()
+        };
+        for (step, found) in [(1, by_rows(1)), (3, by_rows(3))] {
+            for place in 0..scene.width * scene.height {
+                let (normal, expected) = (found.data[place], maps.normal.data[place]);
+                let left_out = !(place / scene.width).is_multiple_of(step) || expected == [0.0; 3];
+                let [normal, expected] = [normal, expected].map(|n| Vector3::from(n).cast::<f64>());
+                assert_eq!(normal == Vector3::zeros(), left_out, "{recipe:?}, {step}, {place}");
+                // With a mask the run's rows begin elsewhere, and float32 rounds otherwise.
+                let same = left_out || angle_deg(&normal, &expected) < SAME_NORMAL_DEG;
+                assert!(same, "{recipe:?}, one row in {step}, photosite {place}");
+            }
+        }
+    }
 }

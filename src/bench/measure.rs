@@ -1,0 +1,250 @@
+//! Times and errors of every contender on one set.
+
+use super::methods::{Answer, Contender, Pace};
+use super::report::{MethodReport, SetReport, Touch};
+use super::sets::Set;
+use super::{BenchError, Effort, pareto_front};
+use crate::compare::{NormalFigures, Pair, compare_normals};
+use crate::photometry::Outcome;
+use crate::raw::{Frame, Samples};
+use crate::solve::{Rows, Scene, SolveError};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use std::hint::black_box;
+use std::ops::Range;
+use std::time::Instant;
+use weavelight_calibration::description::Image;
+
+/// A contender is not run again once it has taken this long.
+const BUDGET_S: f64 = 1.0;
+/// Rows of a band when touching.
+const BAND_ROWS: usize = 64;
+
+/// A contender's runs.
+struct Runs {
+    figures: Figures,
+    robust_share: Option<f64>,
+    seconds: Vec<f64>,
+}
+
+/// Errors, and how many photosites have none.
+struct Figures {
+    errors: NormalFigures,
+    unsolved_share: f64,
+}
+
+/// Measures every contender on a set, all in turns.
+pub(super) fn of_set(
+    set: &Set,
+    contenders: &[Contender],
+    effort: Effort,
+) -> Result<SetReport, BenchError> {
+    let step = rows_step(set, effort);
+    let (touches, runs) =
+        Rows::with(&set.scene, |rows| take_turns(set, rows, contenders, step, effort))??;
+    let touch_s = median(&touches);
+    let points: Vec<[f64; 2]> =
+        runs.iter().map(|runs| [median(&runs.seconds), runs.figures.errors.mean_deg]).collect();
+    let methods = contenders.iter().zip(&runs).zip(pareto_front(&points));
+    let methods = methods.map(|((contender, runs), on_front)| MethodReport {
+        on_front,
+        ..method_report(contender, runs, touch_s)
+    });
+    Ok(SetReport {
+        name: set.name.clone(),
+        about: set.about.clone(),
+        size_px: [set.scene.width, set.scene.height],
+        lights: set.scene.lights.len(),
+        rows_step: step,
+        compared: compared(set, step).count(),
+        touch: Touch { bytes: touched_bytes(&set.scene), milliseconds: 1e3 * touch_s },
+        methods: methods.collect(),
+        warnings: set.warnings.clone(),
+    })
+}
+
+fn method_report(contender: &Contender, runs: &Runs, touch_s: f64) -> MethodReport {
+    let NormalFigures { mean_deg, median_deg, rms_deg, p95_deg, .. } = runs.figures.errors;
+    let seconds = median(&runs.seconds);
+    MethodReport {
+        name: contender.name.to_owned(),
+        about: contender.about.to_owned(),
+        times_touch: seconds / touch_s,
+        milliseconds: 1e3 * seconds,
+        repeats: runs.seconds.len(),
+        mean_deg,
+        median_deg,
+        rms_deg,
+        p95_deg,
+        unsolved_share: runs.figures.unsolved_share,
+        robust_share: runs.robust_share,
+        on_front: false,
+    }
+}
+
+/// One row in how many slow methods solve; odd, so that both kinds of rows of the mosaic have their turn.
+fn rows_step(set: &Set, effort: Effort) -> usize {
+    let known = set.truth.data.iter().filter(|normal| is_known(normal)).count();
+    let step = (known / effort.sampled_photosites()).clamp(1, set.truth.height.max(1));
+    step | 1
+}
+
+fn is_known(normal: &[f32; 3]) -> bool {
+    normal.iter().all(|c| c.is_finite()) && normal.iter().any(|&c| c != 0.0)
+}
+
+/// Places of the photosites that errors are taken over.
+fn compared(set: &Set, step: usize) -> impl Iterator<Item = usize> {
+    let width = set.truth.width;
+    let rows = (0..set.truth.height).step_by(step);
+    rows.flat_map(move |y| y * width..(y + 1) * width)
+        .filter(|&place| is_known(&set.truth.data[place]))
+}
+
+/// Seconds of every touch, and the runs of every contender. The first round warms up, and is all that slow contenders get.
+fn take_turns(
+    set: &Set,
+    rows: &Rows,
+    contenders: &[Contender],
+    step: usize,
+    effort: Effort,
+) -> Result<(Vec<f64>, Vec<Runs>), BenchError> {
+    let mut runs = Vec::new();
+    for contender in contenders {
+        let (seconds, answer) = timed(rows, contender, step)?;
+        let figures = figures(set, &answer.normal, step)
+            .ok_or_else(|| BenchError::Nothing { set: set.name.clone() })?;
+        runs.push(Runs { figures, robust_share: answer.robust_share, seconds: vec![seconds] });
+    }
+    let first: Vec<f64> = runs.iter_mut().map(|runs| runs.seconds.remove(0)).collect();
+    let mut touches = Vec::new();
+    for _ in 0..effort.rounds() {
+        touches.push(touch(&set.scene));
+        for ((contender, runs), first) in contenders.iter().zip(&mut runs).zip(&first) {
+            let spent = first + runs.seconds.iter().sum::<f64>();
+            if spent < BUDGET_S {
+                runs.seconds.push(timed(rows, contender, step)?.0);
+            }
+        }
+    }
+    for (runs, first) in runs.iter_mut().zip(first) {
+        if runs.seconds.is_empty() {
+            runs.seconds.push(first);
+        }
+    }
+    for (contender, runs) in contenders.iter().zip(&mut runs) {
+        if contender.pace == Pace::Rows {
+            let share = set.scene.height as f64 / set.scene.height.div_ceil(step) as f64;
+            runs.seconds.iter_mut().for_each(|seconds| *seconds *= share);
+        }
+    }
+    Ok((touches, runs))
+}
+
+fn timed(rows: &Rows, contender: &Contender, step: usize) -> Result<(f64, Answer), SolveError> {
+    let begun = Instant::now();
+    let answer = (contender.solve)(rows, step)?;
+    Ok((begun.elapsed().as_secs_f64(), answer))
+}
+
+/// Errors over the photosites of every `step`th row that have a truth; `None` where there is none.
+fn figures(set: &Set, normal: &Image<[f32; 3]>, step: usize) -> Option<Figures> {
+    let mut unsolved = 0;
+    let pair = |place: usize| -> Pair {
+        let (found, truth) = (normal.data[place], set.truth.data[place].map(f64::from));
+        if is_known(&found) {
+            return (found.map(f64::from), truth);
+        }
+        unsolved += 1;
+        (across(truth), truth)
+    };
+    let pairs: Vec<Pair> = compared(set, step).map(pair).collect();
+    let errors = compare_normals(&pairs)?;
+    Some(Figures { errors, unsolved_share: unsolved as f64 / pairs.len() as f64 })
+}
+
+/// Any direction 90 degrees off.
+fn across(normal: [f64; 3]) -> [f64; 3] {
+    let normal = Vector3::from(normal);
+    let least = normal.iamin();
+    normal.cross(&Vector3::from_fn(|axis, _| if axis == least { 1.0 } else { 0.0 })).into()
+}
+
+/// The middle value, the mean of the middle two; NaN of nothing.
+pub(super) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    crate::compare::percentile(&sorted, 0.5).unwrap_or(f64::NAN)
+}
+
+/// The maps that a solve returns, as plain memory.
+struct Touched {
+    normal: Vec<[f32; 3]>,
+    albedo: Vec<f32>,
+    error: Vec<f32>,
+    outcome: Vec<Outcome>,
+}
+
+/// Bytes of every sample and of every map.
+pub(super) fn touched_bytes(scene: &Scene) -> usize {
+    let of_frame = |frame: &Frame| match &frame.samples {
+        Samples::U16(samples) => 2 * samples.len(),
+        Samples::F32(samples) => 4 * samples.len(),
+    };
+    let site = size_of::<[f32; 3]>() + 2 * size_of::<f32>() + size_of::<Outcome>();
+    scene.exposures().map(|e| of_frame(&e.frame)).sum::<usize>() + scene.width * scene.height * site
+}
+
+/// Seconds of reading every sample once and writing every byte of the maps once, on the same threads, into fresh memory
+/// like a solve.
+pub(super) fn touch(scene: &Scene) -> f64 {
+    let begun = Instant::now();
+    let pixels = scene.width * scene.height;
+    let mut out = Touched {
+        normal: vec![[0.0; 3]; pixels],
+        albedo: vec![0.0; pixels],
+        error: vec![0.0; pixels],
+        outcome: vec![Outcome::Masked; pixels],
+    };
+    let band = scene.width * BAND_ROWS;
+    let bands = out.normal.par_chunks_mut(band).zip(out.albedo.par_chunks_mut(band));
+    let bands = bands.zip(out.error.par_chunks_mut(band)).zip(out.outcome.par_chunks_mut(band));
+    bands.enumerate().for_each(|(index, (((normal, albedo), error), outcome))| {
+        let span = index * band..index * band + albedo.len();
+        let value: f32 = scene.exposures().map(|e| sum_of(&e.frame, span.clone())).sum();
+        normal.fill([value; 3]);
+        albedo.fill(value);
+        error.fill(value);
+        outcome.fill(Outcome::Fitted);
+    });
+    black_box(&out.normal);
+    black_box((&out.albedo, &out.error, &out.outcome));
+    begun.elapsed().as_secs_f64()
+}
+
+/// Some value that depends on every sample of a span of pixels.
+fn sum_of(frame: &Frame, span: Range<usize>) -> f32 {
+    let channels = frame.layout.channels();
+    let span = span.start * channels..span.end * channels;
+    match &frame.samples {
+        Samples::U16(samples) => {
+            samples[span].iter().fold(0_u32, |sum, &v| sum.wrapping_add(u32::from(v))) as f32
+        }
+        Samples::F32(samples) => f32::from_bits(
+            samples[span].iter().fold(0_u32, |sum, v| sum.wrapping_add(v.to_bits())) & 0x3fff_ffff,
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_unsolved_counts_ninety_degrees() {
+        for normal in [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [0.3, 0.4, 0.866]] {
+            let angle = crate::compare::angle_deg(across(normal), normal);
+            assert!((angle - 90.0).abs() < 1e-9, "{normal:?}: {angle}");
+        }
+    }
+}

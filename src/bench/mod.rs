@@ -1,0 +1,133 @@
+//! Run time against error, for every method: on simulated fabrics and on picture sets from outside, as a table, a picture
+//! and JSON.
+//!
+//! Times are medians of repeats taken in turns, and count as multiples of touching the same bytes once in the same run:
+//! bare seconds say more about the machine than about the program. Errors are angles to the true normals; a photosite
+//! left unsolved counts 90 degrees, so that nobody gains by giving up.
+
+pub mod band;
+mod chart;
+mod curves;
+mod error;
+mod front;
+mod measure;
+pub mod methods;
+mod picture;
+mod report;
+mod sets;
+mod table;
+
+pub use curves::{Curve, CurvePoint};
+pub use error::BenchError;
+pub use front::pareto_front;
+pub use report::{MethodReport, Report, SetReport, Touch};
+pub use sets::{Fabric, SetFolders};
+pub use table::{curves_text, sets_text};
+
+use crate::files::{OutputKind, PROGRAM, SCHEMA, StagedFolder, write_atomic};
+use sets::Set;
+use std::path::PathBuf;
+
+/// The figures, in the output folder.
+pub const BENCH_JSON: &str = "bench.json";
+/// The picture, in the output folder.
+pub const BENCH_SVG: &str = "bench.svg";
+
+const OUTPUT: OutputKind =
+    OutputKind { name: "benchmark", marker: Some(BENCH_JSON), members: &[BENCH_JSON, BENCH_SVG] };
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The folder to write: [`BENCH_JSON`] and [`BENCH_SVG`].
+    pub out: PathBuf,
+    /// Simulated fabrics.
+    pub fabrics: Vec<Fabric>,
+    /// Picture sets from outside.
+    pub sets: Vec<SetFolders>,
+    /// How much.
+    pub effort: Effort,
+    /// Whether to measure on generated bands of many sizes and light counts too.
+    pub curves: Curves,
+}
+
+/// How much to measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// Small frames, few repeats: whether it works, in seconds. Frames this small do not outweigh what a solve spends once.
+    Quick,
+    /// A megapixel out of the middle of the reference sensor.
+    Full,
+}
+
+/// Whether to measure curves over megapixels and lights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Curves {
+    /// No.
+    Leave,
+    /// Yes.
+    Measure,
+}
+
+impl Effort {
+    /// Size of simulated frames.
+    fn size_px(self) -> [usize; 2] {
+        match self {
+            Self::Quick => [320, 208],
+            Self::Full => [1232, 816],
+        }
+    }
+
+    /// Timed rounds.
+    fn rounds(self) -> usize {
+        match self {
+            Self::Quick => 3,
+            Self::Full => 9,
+        }
+    }
+
+    /// Photosites that slow methods solve, about.
+    fn sampled_photosites(self) -> usize {
+        match self {
+            Self::Quick => 5_000,
+            Self::Full => 100_000,
+        }
+    }
+}
+
+/// Measures everything that the options ask for and writes the output folder. `progress` is told the share done (0 to 1)
+/// and what is being done.
+///
+/// # Errors
+/// Where a set cannot be read or solved, a truth does not fit, or `out` cannot be written.
+pub fn run(options: &Options, progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, BenchError> {
+    // Before the work: a place that cannot be written is told at once.
+    let staged = StagedFolder::create(&options.out, OUTPUT)?;
+    let methods = methods::all();
+    let steps = options.fabrics.len() + options.sets.len();
+    let steps = (steps + usize::from(options.curves == Curves::Measure)).max(1) as f64;
+    let mut sets = Vec::new();
+    let mut measure = |name: &str, load: &dyn Fn() -> Result<Set, BenchError>| {
+        progress(sets.len() as f64 / steps, name);
+        sets.push(measure::of_set(&load()?, &methods, options.effort)?);
+        Ok::<(), BenchError>(())
+    };
+    for set in &options.sets {
+        measure(&set.name, &|| set.load())?;
+    }
+    for fabric in &options.fabrics {
+        measure(fabric.name(), &|| fabric.simulate(options.effort.size_px()))?;
+    }
+    let mut curves = Vec::new();
+    if options.curves == Curves::Measure {
+        progress(sets.len() as f64 / steps, "curves");
+        curves = curves::measure(options.effort);
+    }
+    let threads = rayon::current_num_threads();
+    let report = Report { schema: SCHEMA, program: PROGRAM.to_owned(), threads, sets, curves };
+    write_atomic(&staged.join(BENCH_SVG), picture::svg(&report).as_bytes())?;
+    write_atomic(&staged.join(BENCH_JSON), report.json().as_bytes())?;
+    staged.commit()?;
+    progress(1.0, "done");
+    Ok(report)
+}
