@@ -88,6 +88,8 @@ pub struct CameraFit {
     pub sigma: [f64; 9],
     /// Per view: from the board's frame to the camera's (x right, y down, z forward), millimetres.
     pub camera_from_board: Vec<IsometryMatrix3<f64>>,
+    /// Per view: one sigma of its pose, three of the rotation (radians) and three of the translation (millimetres).
+    pub pose_sigma: Vec<[f64; 6]>,
     /// Per view: root mean square reprojection error, pixels.
     pub view_rms_px: Vec<f64>,
     /// Over all views.
@@ -279,6 +281,7 @@ mod tests {
             distortion: [0.0; 5],
             sigma: [0.0; 9],
             camera_from_board: views.iter().map(pose).collect(),
+            pose_sigma: vec![[0.0; 6]; views.len()],
             view_rms_px: views.iter().map(|k| rms[*k]).collect(),
             rms_px: 0.2,
         }

@@ -83,11 +83,14 @@ fn search(
 ) -> opencv::Result<Option<(Vector<Point2f>, Detector)>> {
     let size = Size::new(shape.columns as i32, shape.rows as i32);
     let mut corners: Vector<Point2f> = Vector::new();
-    let flags = calib3d::CALIB_CB_NORMALIZE_IMAGE
-        | calib3d::CALIB_CB_EXHAUSTIVE
-        | calib3d::CALIB_CB_ACCURACY;
-    if calib3d::find_chessboard_corners_sb(picture, size, &mut corners, flags)? {
-        return Ok(Some((corners, Detector::SectorBased)));
+    let thorough = calib3d::CALIB_CB_NORMALIZE_IMAGE | calib3d::CALIB_CB_EXHAUSTIVE;
+    // Normalising equalises the histogram: on an evenly lit sheet, of which the board is a small part, it blows noise up to
+    // full contrast. Without it such boards are found.
+    for flags in [thorough, 0] {
+        let flags = flags | calib3d::CALIB_CB_ACCURACY;
+        if calib3d::find_chessboard_corners_sb(picture, size, &mut corners, flags)? {
+            return Ok(Some((corners, Detector::SectorBased)));
+        }
     }
     let flags = calib3d::CALIB_CB_ADAPTIVE_THRESH | calib3d::CALIB_CB_NORMALIZE_IMAGE;
     if !calib3d::find_chessboard_corners(picture, size, &mut corners, flags)? {
@@ -205,12 +208,14 @@ fn fit(views: &[&BoardView], shape: &BoardShape, size_px: [usize; 2]) -> opencv:
     let matrix = matrix.data_typed::<f64>()?;
     let found = distortion.data_typed::<f64>()?;
     let sigma = sigma.data_typed::<f64>()?;
+    let sigma_poses = sigma_poses.data_typed::<f64>()?;
     let poses = rotations.iter().zip(translations.iter());
     Ok(CameraFit {
         intrinsics: [matrix[0], matrix[4], matrix[2], matrix[5]],
         distortion: std::array::from_fn(|k| found.get(k).copied().unwrap_or(0.0)),
         sigma: std::array::from_fn(|k| sigma.get(k).copied().unwrap_or(f64::NAN)),
         camera_from_board: poses.map(|(r, t)| pose(&r, &t)).collect::<opencv::Result<_>>()?,
+        pose_sigma: sigma_poses.as_chunks::<6>().0.to_vec(),
         view_rms_px: errors.data_typed::<f64>()?.to_vec(),
         rms_px,
     })

@@ -88,12 +88,17 @@ fn departure([c2, c3]: [f64; 2], [low, high]: [f64; 2]) -> f64 {
     (0..=50).map(off).fold(0.0, f64::max)
 }
 
-/// Normal equations of (c2, c3), every series' own slope eliminated by projection.
+/// How far black may be off, as a share of the range: it is estimated too, and its error is common to all readings.
+const BLACK_SIGMA: f64 = 3e-5;
+
+/// Normal equations of (c2, c3); every series' own slope and a common error of black eliminated.
 fn normal_equations(readings: &[Reading]) -> Option<(Matrix2<f64>, Vector2<f64>)> {
-    let (mut normal, mut right) = (Matrix2::<f64>::zeros(), Vector2::<f64>::zeros());
+    let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
+    normal[(2, 2)] = BLACK_SIGMA.powi(-2);
     for series in by_series(readings) {
-        let terms = |r: &Reading| [r.value, r.value.powi(2) - r.value, r.value.powi(3) - r.value];
-        let mut on_t = [0.0; 3];
+        let terms =
+            |r: &Reading| [r.value, r.value.powi(2) - r.value, r.value.powi(3) - r.value, 1.0];
+        let mut on_t = [0.0; 4];
         let mut tt = 0.0;
         for r in &series {
             let w = r.sigma.powi(-2);
@@ -102,16 +107,19 @@ fn normal_equations(readings: &[Reading]) -> Option<(Matrix2<f64>, Vector2<f64>)
         }
         for r in &series {
             let w = r.sigma.powi(-2);
-            let free: [f64; 3] = std::array::from_fn(|k| terms(r)[k] - on_t[k] / tt * r.exposure);
-            for i in 0..2 {
+            let free: [f64; 4] = std::array::from_fn(|k| terms(r)[k] - on_t[k] / tt * r.exposure);
+            for i in 0..3 {
                 right[i] -= w * free[i + 1] * free[0];
-                for j in 0..2 {
+                for j in 0..3 {
                     normal[(i, j)] += w * free[i + 1] * free[j + 1];
                 }
             }
         }
     }
-    (normal[(0, 0)] > 0.0 && normal[(0, 0)].is_finite()).then_some((normal, right))
+    let black = normal.fixed_view::<2, 1>(0, 2) / normal[(2, 2)];
+    let left = normal.fixed_view::<2, 2>(0, 0) - black * normal.fixed_view::<1, 2>(2, 0);
+    let right = right.xy() - black * right.z;
+    (left[(0, 0)] > 0.0 && left[(0, 0)].is_finite()).then_some((left, right))
 }
 
 fn solve_two(normal: &Matrix2<f64>, right: &Vector2<f64>) -> Option<[f64; 2]> {

@@ -35,6 +35,8 @@ pub struct Dng<'a> {
     pub iso: f64,
     /// Millimetres.
     pub focal_length_mm: f64,
+    /// The lens's name.
+    pub lens: &'a str,
     /// The camera's answer to white: R, G, B, green = 1.
     pub neutral: [f64; 3],
     /// CIE XYZ to camera RGB under D65, rows.
@@ -157,6 +159,7 @@ impl Dng<'_> {
             bytes(36864, UNDEFINED, b"0230"),
             text(36867, self.date_time),
             rationals(37386, &[self.focal_length_mm]),
+            text(42036, self.lens),
         ]
     }
 }
@@ -265,6 +268,7 @@ mod tests {
             exposure_s: 0.437,
             iso: 100.0,
             focal_length_mm: 35.0,
+            lens: "Bench 35 mm",
             neutral: [0.52, 1.0, 0.66],
             camera_from_xyz: std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)])),
         };
@@ -303,6 +307,7 @@ mod tests {
             exposure_s: 1.0,
             iso: 100.0,
             focal_length_mm: 1.0,
+            lens: "",
             neutral: [1.0; 3],
             camera_from_xyz: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         };

@@ -4,7 +4,7 @@ use super::boards::{self, Corners, shape_of};
 use super::frames::{check_size, grey_picture, read_frame};
 use super::{CalibrateError, Inputs, Progress};
 use crate::files::Provenance;
-use crate::instrument::{Rig, write_camera};
+use crate::instrument::{MeasuredCamera, Optics, Rig, write_camera};
 use crate::session::{Board, FrameEntry, Kind, Session};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -32,12 +32,16 @@ pub struct CameraReport {
     pub distortion: [f64; 5],
     /// One sigma of the four and of the five.
     pub sigma: [f64; 9],
+    /// One sigma of the camera's pose over the table: rotation about its x, y, z in degrees, and place in millimetres.
+    pub pose_sigma: [f64; 6],
     /// Root mean square reprojection error over the boards kept.
     pub rms_reprojection_px: f64,
     /// Every picture of the board.
     pub boards: Vec<BoardReport>,
-    /// Corners in each field of an 8 x 6 grid over the picture, row by row.
+    /// Corners in each field of a grid over the picture, row by row.
     pub coverage: Vec<usize>,
+    /// Fields across and down.
+    pub coverage_grid: [usize; 2],
     /// Camera above the table, millimetres.
     pub height_mm: f64,
     /// Sentences.
@@ -92,12 +96,14 @@ pub fn camera(
         .collect();
     let size = [rig.camera.width_px, rig.camera.height_px];
     progress(0.0, "looking for the board");
-    let found = find_all(&pictures, &shape, &options.rig, size, progress)?;
+    let (found, optics): (Vec<Option<Corners>>, Vec<Optics>) =
+        find_all(&pictures, &shape, &options.rig, size, progress)?.into_iter().unzip();
     if found.iter().all(Option::is_none) {
         return Err(none_found(&pictures, &shape));
     }
     let table = table_picture(&pictures);
     let used: Vec<usize> = (0..pictures.len()).filter(|k| found[*k].is_some()).collect();
+    let optics = one_optics(&pictures, &optics)?;
     let views: Vec<Corners> = found.iter().flatten().cloned().collect();
     progress(0.8, "fitting the camera");
     let (fit, kept, dropped) = boards::fit(&views, &shape, size)?;
@@ -125,9 +131,11 @@ pub fn camera(
         intrinsics_px: fit.intrinsics,
         distortion: fit.distortion,
         sigma: fit.sigma,
+        pose_sigma: pose_sigma(fit.pose_sigma.get(table_view)),
         rms_reprojection_px: fit.rms_px,
         boards,
         coverage: coverage(&kept_views, size, COVERAGE_GRID),
+        coverage_grid: COVERAGE_GRID,
         height_mm: centre_height(&camera),
         warnings: Vec::new(),
     };
@@ -137,7 +145,8 @@ pub fn camera(
         Inputs::of(&options.rig, &sessions)?,
         quality(&report),
     );
-    write_camera(&options.out, &camera, Some(fit.rms_px), &provenance)?;
+    let measured = MeasuredCamera { camera, rms_reprojection_px: Some(fit.rms_px), optics };
+    write_camera(&options.out, &measured, &provenance)?;
     progress(1.0, "done");
     Ok(report)
 }
@@ -180,7 +189,7 @@ fn find_all(
     rig: &Path,
     size: [usize; 2],
     progress: &Progress,
-) -> Result<Vec<Option<Corners>>, CalibrateError> {
+) -> Result<Vec<(Option<Corners>, Optics)>, CalibrateError> {
     let done = std::sync::atomic::AtomicUsize::new(0);
     pictures
         .par_iter()
@@ -188,12 +197,31 @@ fn find_all(
         .map(|picture| {
             let frame = read_frame(picture.session, picture.entry)?;
             check_size(&picture.path(), &frame, rig, size)?;
-            let view = boards::detect(&grey_picture(&frame), shape);
+            let view = boards::detect(&grey_picture(&frame), shape)?;
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             progress(0.8 * done as f64 / pictures.len() as f64, "looking for the board");
-            view
+            Ok((view, Optics::of(&frame.metadata)))
         })
         .collect()
+}
+
+/// The camera and lens of all pictures, which must be one and the same.
+fn one_optics(pictures: &[Picture], optics: &[Optics]) -> Result<Optics, CalibrateError> {
+    let Some(first) = optics.first() else { return Ok(Optics::default()) };
+    for (picture, other) in pictures.iter().zip(optics) {
+        if let Some(what) = first.differences(other).first() {
+            let what = format!("{what} ({})", pictures[0].name());
+            let remedy = "photograph all boards with one camera and lens at one focal length";
+            return Err(CalibrateError::target(picture.path(), what, remedy));
+        }
+    }
+    Ok(first.clone())
+}
+
+/// Radians to degrees; not known where the fit does not say.
+fn pose_sigma(of_table: Option<&[f64; 6]>) -> [f64; 6] {
+    let sigma = of_table.copied().unwrap_or([f64::NAN; 6]);
+    std::array::from_fn(|k| if k < 3 { sigma[k].to_degrees() } else { sigma[k] })
 }
 
 /// Says whether another size would have been found.
@@ -295,6 +323,13 @@ fn quality(report: &CameraReport) -> toml::Table {
     let names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"];
     for (name, sigma) in names.iter().zip(report.sigma) {
         table.insert(format!("{name}_sigma"), toml::Value::Float(sigma));
+    }
+    let names = ["rotation_x", "rotation_y", "rotation_z", "x", "y", "z"];
+    for (k, (name, sigma)) in names.iter().zip(report.pose_sigma).enumerate() {
+        let unit = if k < 3 { "deg" } else { "mm" };
+        if sigma.is_finite() {
+            table.insert(format!("{name}_sigma_{unit}"), toml::Value::Float(sigma));
+        }
     }
     let counts = report.coverage.iter().map(|count| toml::Value::Integer(*count as i64)).collect();
     table.insert("coverage_8x6".into(), toml::Value::Array(counts));

@@ -2,10 +2,10 @@
 //!
 //! A flat sheet alone proves nothing: gain maps make it read flat whatever the positions are. Tilted sheets tell.
 
-use super::sheet::{observe, tilt_and_height};
+use super::sheet::{Known, observe, tilt_and_height};
 use super::{CalibrateError, Progress};
 use crate::files::FileError;
-use crate::instrument::{Calibration, Color};
+use crate::instrument::Calibration;
 use crate::session::Session;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -81,7 +81,13 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
             remedy,
         ));
     };
-    let color: &Color = &calibration.color;
+    let known = Known {
+        camera: &camera,
+        optics: &calibration.optics,
+        color: &calibration.color,
+        defects: &calibration.defects,
+        lights: calibration.lights.len(),
+    };
     let mut report = CheckReport {
         passed: true,
         threshold_deg: options.threshold_deg,
@@ -93,7 +99,7 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
         let part = |share: f64, what: &str| {
             progress((k as f64 + share) / options.sessions.len() as f64, what);
         };
-        let observed = observe(&session, calibration.lights.len(), &camera, color, &part)?;
+        let observed = observe(&session, known, &part)?;
         report.warnings.extend(observed.warnings);
         let pose_deg = observed.sheet.pose_sigma.tilt_rad.to_degrees();
         if pose_deg > 0.5 * options.threshold_deg {

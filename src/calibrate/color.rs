@@ -2,16 +2,20 @@
 
 use super::frames::Levels;
 use super::lights::nominal_camera;
-use super::patches::{ChartFrame, defects, read_chart};
+use super::patches::{ChartFrame, ChartFrames, read_chart};
+use super::sheet::optics_warnings;
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::{Provenance, write_toml};
-use crate::instrument::{Calibration, Color, Noise, Rig, RigLightPlace, write_color};
+use crate::files::Provenance;
+use crate::instrument::{
+    CAMERA_FILE, COLOR_FILE, Calibration, Color, Defects, Noise, Optics, Rig, RigLightPlace,
+    write_color, write_defects,
+};
 use crate::session::{Kind, Patch, Session};
 use nalgebra::{Matrix3, Vector3};
 use palette::color_difference::Ciede2000;
 use palette::white_point::D50;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use weavelight_calibration::color::{ColorPatch, fit_color_matrix, lab_d50_from_linear_srgb};
 use weavelight_calibration::description::{Camera, Light, Plane, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;
@@ -64,18 +68,12 @@ pub struct ColorReport {
     pub warnings: Vec<String>,
 }
 
-#[derive(Serialize)]
-struct DefectsFile<'a> {
-    schema: i64,
-    hot: &'a [[u32; 2]],
-    dead: &'a [[u32; 2]],
-}
-
 /// Everything the steps share.
 struct Chart {
     session: Session,
     patches: Vec<Patch>,
     frames: Vec<ChartFrame>,
+    defects: Defects,
     lights: usize,
 }
 
@@ -86,7 +84,8 @@ struct Chart {
 pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
     let chart = load(options, &rig, progress)?;
-    let mut warnings = Vec::new();
+    let before = before(&options.out)?;
+    let mut warnings = other_optics(&chart, before.as_ref());
     let (black, black_from) = black_level(&chart);
     let mut color = Color {
         black_level: Some(black),
@@ -114,16 +113,13 @@ pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport,
     color.noise = noise.map(|(electrons_per_dn, read_noise_e)| Noise {
         electrons_per_dn,
         read_noise_e,
-        kappa: 0.0,
+        // Of the lights: their own step found it.
+        kappa: before.as_ref().and_then(|c| c.color.noise).map_or(0.0, |noise| noise.kappa),
     });
-    let camera = Calibration::load(&options.out)
-        .ok()
-        .and_then(|c| c.camera)
-        .or_else(|| nominal_camera(&rig));
+    let camera = before.and_then(|c| c.camera).or_else(|| nominal_camera(&rig));
     let colors = color_patches(&chart, &levels, &color.white_balance, &rig, camera.as_ref());
     let (matrix, matrix_from, differences) = matrix(&chart, &colors);
     color.camera_to_linear_srgb = matrix;
-    let (hot, dead) = defects(&chart.frames);
     let report = ColorReport {
         black_level: black,
         black_from,
@@ -137,20 +133,30 @@ pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport,
             .map(|m| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))),
         matrix_from,
         patches_de2000: differences,
-        hot: hot.len(),
-        dead: dead.len(),
+        hot: chart.defects.hot().len(),
+        dead: chart.defects.dead().len(),
         warnings,
     };
     let inputs = Inputs::of(&options.rig, std::slice::from_ref(&chart.session))?;
     let provenance =
         Provenance::of_this_program(Some(jiff::Timestamp::now()), inputs, quality(&report));
     write_color(&options.out, &color, &provenance)?;
-    write_toml(
-        &options.out.join("defects.toml"),
-        &DefectsFile { schema: 1, hot: &hot, dead: &dead },
-    )?;
+    write_defects(&options.out, &chart.defects, &provenance)?;
     progress(1.0, "done");
     Ok(report)
+}
+
+/// What the folder holds so far, if anything; a broken file is told before an hour of work is lost on it.
+fn before(out: &Path) -> Result<Option<Calibration>, CalibrateError> {
+    let there = [CAMERA_FILE, COLOR_FILE].iter().any(|name| out.join(name).exists());
+    Ok(there.then(|| Calibration::load(out)).transpose()?)
+}
+
+fn other_optics(chart: &Chart, before: Option<&Calibration>) -> Vec<String> {
+    let frames: Vec<Optics> = chart.frames.iter().map(|f| Optics::of(&f.metadata)).collect();
+    before.map_or_else(Vec::new, |before| {
+        optics_warnings(&chart.session, &before.optics, frames.iter())
+    })
 }
 
 fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart, CalibrateError> {
@@ -177,7 +183,7 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
         ));
     }
     progress(0.1, "reading the chart");
-    let frames = read_chart(&session, &patches)?;
+    let ChartFrames { frames, defects } = read_chart(&session, &patches)?;
     let size = [rig.camera.width_px, rig.camera.height_px];
     if let Some(k) = frames.iter().position(|frame| frame.size != size) {
         let (frame, rig) = (session.frame_path(&session.frames[k]), options.rig.clone());
@@ -188,7 +194,7 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
             expected: size,
         });
     }
-    Ok(Chart { session, patches, frames, lights: rig.lights.len() })
+    Ok(Chart { session, patches, frames, defects, lights: rig.lights.len() })
 }
 
 fn levels(chart: &Chart, color: &Color) -> Levels {
@@ -341,6 +347,7 @@ fn check_place(chart: &Chart, levels: &Levels) -> Result<(), CalibrateError> {
         let ratio = brightness(*k) / typical;
         ratio.is_nan() || !(1.0 / MISPLACED..MISPLACED).contains(&ratio)
     };
+    check_edges(chart, levels)?;
     let wrong: Vec<usize> = greys.iter().copied().filter(off).collect();
     let Some(first) = wrong.first() else { return Ok(()) };
     let what = format!(
@@ -351,6 +358,40 @@ fn check_place(chart: &Chart, levels: &Levels) -> Result<(), CalibrateError> {
         brightness(*first) / typical
     );
     let remedy = "the chart lies elsewhere: put it back, or correct rect_px and reflectance";
+    Err(CalibrateError::target(chart.session.manifest_path(), what, remedy))
+}
+
+/// A patch whose samples scatter about its mean by more than this, noise aside, has an edge in it. Shading stays below.
+const EDGE_SHARE: f64 = 0.15;
+
+/// Every rectangle must lie within its patch: half on the patch and half beside it, it may be as bright as it should by chance.
+fn check_edges(chart: &Chart, levels: &Levels) -> Result<(), CalibrateError> {
+    let unevenness = |k: usize| {
+        let clean = chart.frames.iter().filter(|frame| {
+            frame.light.is_some() && frame.light_in(k, levels).iter().all(|v| v.is_finite())
+        });
+        let Some(frame) = clean.max_by(|a, b| a.exposure.total_cmp(&b.exposure)) else {
+            return 0.0;
+        };
+        let of_place = |place: usize| {
+            let stats = &frame.patches[k];
+            let scatter = (stats.spread[place] - stats.variance[place]).max(0.0).sqrt();
+            scatter / (stats.mean[place] - levels.black[place]).max(1e-3 * levels.range(place))
+        };
+        (0..4).map(of_place).fold(0.0, f64::max)
+    };
+    let cut: Vec<usize> =
+        (0..chart.patches.len()).filter(|k| unevenness(*k) > EDGE_SHARE).collect();
+    let Some(first) = cut.first() else { return Ok(()) };
+    let what = format!(
+        "{} of {} patches have an edge in their rectangle (patch {first} at {:?} is uneven by {:.0} %)",
+        cut.len(),
+        chart.patches.len(),
+        chart.patches[*first].rect_px,
+        100.0 * unevenness(*first)
+    );
+    let remedy =
+        "the chart lies elsewhere: put it back and photograph it again, or correct rect_px";
     Err(CalibrateError::target(chart.session.manifest_path(), what, remedy))
 }
 

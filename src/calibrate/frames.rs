@@ -1,7 +1,7 @@
 //! Frames of targets: read, made linear, averaged over rectangles.
 
 use super::CalibrateError;
-use crate::instrument::Color;
+use crate::instrument::{Color, Defects};
 use crate::raw::{Encoding, Frame, Hint, Layout, ReadError, Samples, decode};
 use crate::session::{self, FrameEntry, Session};
 use std::path::Path;
@@ -108,8 +108,8 @@ pub(super) struct Mean {
     pub(super) saturated: f64,
 }
 
-/// Mean light of a rectangle. A grey frame gives three equal channels.
-pub(super) fn mean_in(frame: &Frame, levels: &Levels, rect: Rect) -> Mean {
+/// Mean light of a rectangle, defective photosites left out. A grey frame gives three equal channels.
+pub(super) fn mean_in(frame: &Frame, levels: &Levels, defects: &Defects, rect: Rect) -> Mean {
     let (mut sum, mut square, mut count) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     let (mut saturated, mut all) = (0.0, 0.0);
     let mut add = |channel: usize, light: Option<f64>| {
@@ -124,7 +124,11 @@ pub(super) fn mean_in(frame: &Frame, levels: &Levels, rect: Rect) -> Mean {
         }
     };
     for y in rect.y[0]..rect.y[1].min(frame.height) {
+        let mut defective = defects.columns(y, rect.x[0]).peekable();
         for x in rect.x[0]..rect.x[1].min(frame.width) {
+            if defective.next_if_eq(&x).is_some() {
+                continue;
+            }
             let place = (y & 1) * 2 + (x & 1);
             match frame.layout {
                 Layout::Mosaic(cfa) => {
@@ -159,6 +163,7 @@ pub(super) fn grey_picture(frame: &Frame) -> Image<f32> {
     let mut image = Image { width, height, data };
     if matches!(frame.layout, Layout::Mosaic(_)) {
         balance(&mut image, &frame.black);
+        image = without_specks(&image);
         image = binomial(&image);
     }
     image
@@ -180,6 +185,48 @@ fn balance(image: &mut Image<f32>, black: &[f32; 4]) {
         let place = ((k / width) & 1) * 2 + ((k % width) & 1);
         *value = (*value - black[place]) * (means[1] / means[place]) as f32;
     }
+}
+
+/// A photosite is a speck if it leaves the range of its neighbours by this share of the picture's contrast.
+const SPECK_SHARE: f32 = 0.15;
+
+/// Brings hot and dead photosites back into the range of the eight nearest of their colour, the one highest and the one
+/// lowest of these aside (they may be defective too). Everything else stays as it is: edges and corners of a target are wider
+/// than one photosite.
+fn without_specks(image: &Image<f32>) -> Image<f32> {
+    let mut sample: Vec<f32> = image.data.iter().step_by(61).copied().collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    let at = |share: f64| sample.get((share * sample.len() as f64) as usize).copied();
+    let contrast = at(0.98).unwrap_or(0.0) - at(0.02).unwrap_or(0.0);
+    let slack = SPECK_SHARE * contrast;
+    let mut out = image.clone();
+    for y in 2..image.height.saturating_sub(2) {
+        let rows = [y - 2, y, y + 2].map(|row| image.row(row));
+        for x in 2..image.width.saturating_sub(2) {
+            let here = rows[1][x];
+            // Most photosites lie between two of their neighbours: these need no sorting.
+            let [left, right] = [rows[1][x - 2], rows[1][x + 2]];
+            if here <= left.max(right) + slack && here >= left.min(right) - slack {
+                continue;
+            }
+            let mut around = [
+                rows[0][x - 2],
+                rows[0][x],
+                rows[0][x + 2],
+                left,
+                right,
+                rows[2][x - 2],
+                rows[2][x],
+                rows[2][x + 2],
+            ];
+            around.sort_unstable_by(f32::total_cmp);
+            let (low, high) = (around[1], around[6]);
+            if here > high + slack || here < low - slack {
+                out.data[y * image.width + x] = here.clamp(low, high);
+            }
+        }
+    }
+    out
 }
 
 /// [1 2 1] x [1 2 1] / 16, borders mirrored (which keeps the colour places' weights).

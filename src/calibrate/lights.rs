@@ -1,10 +1,10 @@
 //! `calibrate lights`: every LED's position, beam and strength from white sheets.
 
-use super::sheet::{Observed, observe, tilt_and_height};
+use super::sheet::{Known, Observed, observe, tilt_and_height};
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::Provenance;
+use crate::files::{Input, Provenance, sha256_of_file};
 use crate::instrument::{
-    CalibratedLight, Calibration, Noise, Rig, RigLightPlace, write_color, write_lights,
+    CAMERA_FILE, CalibratedLight, Calibration, Noise, Rig, RigLightPlace, write_color, write_lights,
 };
 use crate::session::Session;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -82,6 +82,8 @@ pub struct SheetReport {
     pub tilt_deg: f64,
     /// Over the table at its middle.
     pub height_mm: f64,
+    /// Share of full scale that the brightest light's brightest cells reach; 0.5 to 0.9 is good.
+    pub brightest: f64,
     /// Cells used.
     pub cells: usize,
     /// What the fit corrected of the stated pose: two tilts in degrees, offset in millimetres.
@@ -107,29 +109,27 @@ pub fn lights(
     progress: &Progress,
 ) -> Result<LightsReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
-    let calibration = Calibration::load(&options.out).ok();
-    let camera = calibration.as_ref().and_then(|calibration| calibration.camera.clone());
-    let Some(camera) = camera else {
-        let remedy = "run `weavelight calibrate camera` into the same folder first";
-        return Err(CalibrateError::target(
-            &options.out,
-            "the camera is not calibrated yet",
-            remedy,
-        ));
+    let calibration = with_camera(&options.out)?;
+    let Some(camera) = &calibration.camera else { return Err(no_camera(&options.out)) };
+    let known = Known {
+        camera,
+        optics: &calibration.optics,
+        color: &calibration.color,
+        defects: &calibration.defects,
+        lights: rig.lights.len(),
     };
-    let color =
-        calibration.as_ref().map(|calibration| calibration.color.clone()).unwrap_or_default();
     let sessions: Vec<Session> =
         options.sessions.iter().map(|path| Session::load(path)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
-    let mut sheets: Vec<Sheet> = Vec::new();
+    let (mut sheets, mut brightest): (Vec<Sheet>, Vec<f64>) = (Vec::new(), Vec::new());
     for (k, session) in sessions.iter().enumerate() {
         let part = |share: f64, what: &str| {
             progress(0.8 * (k as f64 + share) / sessions.len() as f64, what);
         };
-        let observed: Observed = observe(session, rig.lights.len(), &camera, &color, &part)?;
+        let observed: Observed = observe(session, known, &part)?;
         warnings.extend(observed.warnings);
         sheets.push(observed.sheet);
+        brightest.push(observed.brightest);
     }
     let priors: Vec<Prior> = rig.lights.iter().map(|light| prior(&light.place)).collect();
     check_poses(&sheets, &options.rig)?;
@@ -147,19 +147,34 @@ pub fn lights(
         .map(|(i, light)| calibrated(light, &found, &priors[i], i))
         .collect();
     warnings.extend(light_warnings(&calibrated));
-    let report = report(&sheets, &fitted, &found, &calibrated, &priors, fit_seconds, warnings);
-    let provenance = Provenance::of_this_program(
-        Some(jiff::Timestamp::now()),
-        Inputs::of(&options.rig, &sessions)?,
-        quality(&report, &sheets, &priors),
-    );
+    let mut report = report(&sheets, &fitted, &found, &calibrated, &priors, fit_seconds, warnings);
+    report.sheets.iter_mut().zip(&brightest).for_each(|(sheet, level)| sheet.brightest = *level);
+    let mut inputs = Inputs::of(&options.rig, &sessions)?;
+    // The rig frame is this camera's: `solve` warns where another one stands beside the lights.
+    inputs.push(Input {
+        name: CAMERA_FILE.to_owned(),
+        sha256: sha256_of_file(&options.out.join(CAMERA_FILE))?,
+    });
+    let quality = quality(&report, &sheets, &priors);
+    let provenance = Provenance::of_this_program(Some(jiff::Timestamp::now()), inputs, quality);
     progress(0.95, "writing");
     write_lights(&options.out, &calibrated, &provenance)?;
-    if let Some(calibration) = &calibration {
-        note_kappa(&options.out, calibration, fitted.slow_error_rms)?;
-    }
+    note_kappa(&options.out, &calibration, fitted.slow_error_rms)?;
     progress(1.0, "done");
     Ok(report)
+}
+
+/// What the folder holds so far; a broken file is told, an absent camera has its own message.
+fn with_camera(out: &Path) -> Result<Calibration, CalibrateError> {
+    if !out.join(CAMERA_FILE).exists() {
+        return Err(no_camera(out));
+    }
+    Ok(Calibration::load(out)?)
+}
+
+fn no_camera(out: &Path) -> CalibrateError {
+    let remedy = "run `weavelight calibrate camera` into the same folder first";
+    CalibrateError::target(out, "the camera is not calibrated yet", remedy)
 }
 
 fn prior(place: &RigLightPlace) -> Prior {
@@ -286,6 +301,7 @@ fn report(
             name: sheet.name.clone(),
             tilt_deg,
             height_mm,
+            brightest: f64::NAN,
             cells: sheet.cells.len(),
             correction,
         }
@@ -329,6 +345,14 @@ fn quality(report: &LightsReport, sheets: &[Sheet], priors: &[Prior]) -> toml::T
     table.insert(
         "ruler_sigma_mm".into(),
         row(&priors.iter().map(|p| p.position_sigma_mm).collect::<Vec<_>>()),
+    );
+    table.insert(
+        "sheet_names".into(),
+        toml::Value::Array(report.sheets.iter().map(|s| s.name.clone().into()).collect()),
+    );
+    table.insert(
+        "brightest_levels".into(),
+        row(&report.sheets.iter().map(|s| s.brightest).collect::<Vec<_>>()),
     );
     table.insert("sheet_planes".into(), toml::Value::Array(sheets.iter().map(plane).collect()));
     table

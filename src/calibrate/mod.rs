@@ -7,6 +7,7 @@ mod boards;
 mod camera;
 mod check;
 mod color;
+mod defective;
 mod error;
 mod frames;
 mod lights;

@@ -1,11 +1,12 @@
 //! What the patches of a chart read in every frame.
 
 use super::CalibrateError;
+use super::defective;
 use super::frames::{Levels, raw_at, read_frame, seconds_at_iso_100};
+use crate::instrument::Defects;
 use crate::raw::{Frame, Layout, Metadata};
-use crate::session::{Patch, Session};
+use crate::session::{FrameEntry, Patch, Session};
 use rayon::prelude::*;
-use std::collections::HashMap;
 use weavelight_calibration::description::Cfa;
 
 /// One patch in one frame, per place of the 2 x 2 cell, raw numbers.
@@ -16,6 +17,8 @@ pub(super) struct PatchStats {
     pub(super) variance: [f64; 4],
     pub(super) count: [f64; 4],
     pub(super) highest: f64,
+    /// Of one sample about the patch's mean: shading, and whatever else lies in the rectangle.
+    pub(super) spread: [f64; 4],
 }
 
 /// One frame of the chart.
@@ -31,8 +34,12 @@ pub(super) struct ChartFrame {
     pub(super) top: (f64, usize),
     pub(super) size: [usize; 2],
     pub(super) metadata: Metadata,
-    /// Samples far above (dark frames) or far below (lit ones) all their neighbours.
-    pub(super) suspects: Vec<[u32; 2]>,
+}
+
+/// All frames of the chart and the photosites that measure nothing.
+pub(super) struct ChartFrames {
+    pub(super) frames: Vec<ChartFrame>,
+    pub(super) defects: Defects,
 }
 
 impl ChartFrame {
@@ -54,12 +61,12 @@ impl ChartFrame {
     }
 }
 
-/// Reads every frame of the chart.
+/// Reads every frame of the chart; they are held together, because defects show in the sum of all.
 pub(super) fn read_chart(
     session: &Session,
     patches: &[Patch],
-) -> Result<Vec<ChartFrame>, CalibrateError> {
-    let read = |entry| -> Result<ChartFrame, CalibrateError> {
+) -> Result<ChartFrames, CalibrateError> {
+    let read = |entry: &FrameEntry| -> Result<(Frame, Cfa), CalibrateError> {
         let frame = read_frame(session, entry)?;
         let Layout::Mosaic(cfa) = frame.layout else {
             let remedy = "take the chart as RAW, or skip this step: without color.toml the frames' own levels are used";
@@ -72,20 +79,40 @@ pub(super) fn read_chart(
         for (k, patch) in patches.iter().enumerate() {
             check_inside(session, patch, k, &frame)?;
         }
-        Ok(ChartFrame {
-            light: entry.light,
-            exposure: seconds_at_iso_100(entry),
-            patches: patches.iter().map(|patch| stats(&frame, patch)).collect(),
-            cfa,
-            black: frame.black,
-            saturation: frame.saturation,
-            top: top(&frame),
-            size: [frame.width, frame.height],
-            suspects: suspects(&frame, entry.light.is_none()),
-            metadata: frame.metadata,
-        })
+        Ok((frame, cfa))
     };
-    session.frames.par_iter().with_max_len(1).map(read).collect()
+    let read: Vec<(Frame, Cfa)> =
+        session.frames.par_iter().with_max_len(1).map(read).collect::<Result<_, _>>()?;
+    check_one_size(session, &read)?;
+    let lit = |entry: &FrameEntry| entry.light.is_some();
+    let all: Vec<(bool, &Frame)> =
+        session.frames.iter().zip(&read).map(|(entry, (frame, _))| (lit(entry), frame)).collect();
+    let defects = defective::find(&all);
+    let of_frame = |(entry, (frame, cfa)): (&FrameEntry, &(Frame, Cfa))| ChartFrame {
+        light: entry.light,
+        exposure: seconds_at_iso_100(entry),
+        patches: patches.iter().map(|patch| stats(frame, patch, &defects)).collect(),
+        cfa: *cfa,
+        black: frame.black,
+        saturation: frame.saturation,
+        top: top(frame, &defects),
+        size: [frame.width, frame.height],
+        metadata: frame.metadata.clone(),
+    };
+    let frames = session.frames.par_iter().zip(&read).map(of_frame).collect();
+    Ok(ChartFrames { frames, defects })
+}
+
+/// Frames of two sizes have no photosites in common.
+fn check_one_size(session: &Session, read: &[(Frame, Cfa)]) -> Result<(), CalibrateError> {
+    let size = |frame: &Frame| [frame.width, frame.height];
+    let Some((first, _)) = read.first() else { return Ok(()) };
+    let Some(k) = read.iter().position(|(frame, _)| size(frame) != size(first)) else {
+        return Ok(());
+    };
+    let path = |k: usize| session.frame_path(&session.frames[k]);
+    let (found, expected) = (size(&read[k].0), size(first));
+    Err(CalibrateError::WrongSize { frame: path(k), found, rig: path(0), expected })
 }
 
 fn check_inside(
@@ -106,19 +133,25 @@ fn check_inside(
     Err(CalibrateError::target(session.manifest_path(), what, "correct its rect_px"))
 }
 
-fn stats(frame: &Frame, patch: &Patch) -> PatchStats {
+fn stats(frame: &Frame, patch: &Patch, defects: &Defects) -> PatchStats {
     let [u0, v0, u1, v1] = patch.rect_px.map(|c| c.round().max(0.0) as usize);
     let mut out = PatchStats::default();
     let mut pairs = [0.0f64; 4];
+    let mut square = [0.0f64; 4];
     for y in v0..=v1.min(frame.height - 1) {
+        let defective: Vec<usize> = defects.columns(y, u0).take_while(|x| *x <= u1).collect();
         for x in u0..=u1.min(frame.width - 1) {
+            if defective.contains(&x) {
+                continue;
+            }
             let place = (y & 1) * 2 + (x & 1);
             let raw = raw_at(frame, x, y, 0);
             out.mean[place] += raw;
             out.count[place] += 1.0;
             out.highest = out.highest.max(raw);
+            square[place] += raw * raw;
             // Disjoint pairs along the row, so that every difference is independent.
-            if x >= u0 + 2 && ((x - u0) / 2) % 2 == 1 {
+            if x >= u0 + 2 && ((x - u0) / 2) % 2 == 1 && !defective.contains(&(x - 2)) {
                 out.variance[place] += (raw - raw_at(frame, x - 2, y, 0)).powi(2) / 2.0;
                 pairs[place] += 1.0;
             }
@@ -127,14 +160,19 @@ fn stats(frame: &Frame, patch: &Patch) -> PatchStats {
     for (place, pairs) in pairs.iter().enumerate() {
         out.mean[place] /= out.count[place];
         out.variance[place] /= pairs;
+        out.spread[place] = (square[place] / out.count[place] - out.mean[place].powi(2)).max(0.0);
     }
     out
 }
 
-fn top(frame: &Frame) -> (f64, usize) {
+fn top(frame: &Frame, defects: &Defects) -> (f64, usize) {
     let mut top = (f64::NEG_INFINITY, 0);
     for y in 0..frame.height {
+        let mut defective = defects.columns(y, 0).peekable();
         for x in 0..frame.width {
+            if defective.next_if_eq(&x).is_some() {
+                continue;
+            }
             let raw = raw_at(frame, x, y, 0);
             if raw > top.0 {
                 top = (raw, 1);
@@ -144,60 +182,4 @@ fn top(frame: &Frame) -> (f64, usize) {
         }
     }
     top
-}
-
-/// A hot photosite exceeds its neighbours of the same colour by this many raw numbers in the dark, relative to the range.
-const HOT_SHARE: f64 = 0.01;
-/// A dead one has less than this share of the darkest of them, where they are this bright.
-const DEAD_SHARE: f64 = 0.4;
-const LIT_SHARE: f64 = 0.04;
-
-fn suspects(frame: &Frame, dark: bool) -> Vec<[u32; 2]> {
-    let range = f64::from(frame.saturation[0] - frame.black[0]);
-    let row = |y: usize| -> Vec<[u32; 2]> {
-        let mut found = Vec::new();
-        for x in 2..frame.width.saturating_sub(2) {
-            let place = (y & 1) * 2 + (x & 1);
-            let black = f64::from(frame.black[place]);
-            let around = [(x - 2, y), (x + 2, y), (x, y - 2), (x, y + 2)]
-                .map(|(x, y)| raw_at(frame, x, y, 0) - black);
-            let here = raw_at(frame, x, y, 0) - black;
-            let (least, most) = around
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
-            let odd = if dark {
-                here > most + HOT_SHARE * range
-            } else {
-                least > LIT_SHARE * range && here < DEAD_SHARE * least
-            };
-            if odd {
-                found.push([x as u32, y as u32]);
-            }
-        }
-        found
-    };
-    (2..frame.height.saturating_sub(2)).into_par_iter().flat_map_iter(row).collect()
-}
-
-/// Photosites that are hot in every dark frame, and those dead in at least two lit frames.
-pub(super) fn defects(frames: &[ChartFrame]) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let count = |dark: bool| {
-        let mut counts: HashMap<[u32; 2], usize> = HashMap::new();
-        let chosen = frames.iter().filter(|frame| frame.light.is_none() == dark);
-        chosen
-            .flat_map(|frame| &frame.suspects)
-            .for_each(|place| *counts.entry(*place).or_default() += 1);
-        counts
-    };
-    let dark_frames = frames.iter().filter(|frame| frame.light.is_none()).count();
-    let sorted = |counts: HashMap<[u32; 2], usize>, least: usize| {
-        let mut places: Vec<[u32; 2]> = counts
-            .into_iter()
-            .filter(|(_, count)| *count >= least)
-            .map(|(place, _)| place)
-            .collect();
-        places.sort_unstable_by_key(|[x, y]| (*y, *x));
-        places
-    };
-    (sorted(count(true), dark_frames.max(1)), sorted(count(false), 2))
 }

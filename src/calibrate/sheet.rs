@@ -6,7 +6,7 @@ use super::frames::{
 };
 use super::moved::Pattern;
 use super::{CalibrateError, Progress};
-use crate::instrument::Color;
+use crate::instrument::{CAMERA_FILE, Color, Defects, Optics};
 use crate::session::{FrameEntry, Kind, Session};
 use nalgebra::{IsometryMatrix3, Vector3};
 use rayon::prelude::*;
@@ -27,16 +27,30 @@ const DEAD: f64 = 0.02;
 const OVEREXPOSED: f64 = 0.01;
 /// Good range of the brightest light's brightest cells.
 const GOOD_LEVEL: [f64; 2] = [0.5, 0.9];
+/// What the advice aims at.
+const AIM_LEVEL: f64 = 0.7;
 /// Drift of a repeated light that is told.
 const DRIFT: f64 = 0.003;
 /// Cells darker than this share of the typical one show no sheet; cells rougher than this show its edge, print or dust.
 const DARK_CELL: f64 = 0.5;
 const ROUGH_CELL: f64 = 0.06;
 
+/// What is known of the instrument when sheets are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'a> {
+    pub(super) camera: &'a Camera,
+    pub(super) optics: &'a Optics,
+    pub(super) color: &'a Color,
+    pub(super) defects: &'a Defects,
+    pub(super) lights: usize,
+}
+
 /// What a white sheet's capture session gives.
 pub(super) struct Observed {
     pub(super) sheet: Sheet,
     pub(super) warnings: Vec<String>,
+    /// Share of full scale that the brightest light's brightest cells reach.
+    pub(super) brightest: f64,
 }
 
 /// One frame, averaged.
@@ -47,6 +61,7 @@ struct Averaged {
     cells: Vec<Mean>,
     pattern: Pattern,
     board: Option<BoardView>,
+    optics: Optics,
 }
 
 /// Where the sheet lay, and the strip on it.
@@ -63,18 +78,17 @@ struct Pose {
 /// Where frames cannot be read, or the sheet cannot serve; with what to photograph instead.
 pub(super) fn observe(
     session: &Session,
-    lights: usize,
-    camera: &Camera,
-    color: &Color,
+    known: Known,
     progress: &Progress,
 ) -> Result<Observed, CalibrateError> {
+    let Known { camera, lights, .. } = known;
     let place = session.manifest_path();
     if session.kind != Kind::White {
         return Err(CalibrateError::WrongKind { session: place, expected: "white" });
     }
     session.check_lights(lights)?;
     let rects = grid(camera);
-    let frames = average_all(session, camera, color, &rects, progress)?;
+    let frames = average_all(session, known, &rects, progress)?;
     still(session, &frames)?;
     let exposures = Exposures { session, lights, frames: &frames, ambient: ambient(&frames) };
     // Before anything is looked for in the pictures: a strip on an overexposed sheet is not found either.
@@ -82,9 +96,11 @@ pub(super) fn observe(
     exposures.check_saturation(rects.len())?;
     let pose = pose_of(session, camera, &frames)?;
     let cells = cells_on(camera, &pose, &rects, grid_size(camera));
-    let mut warnings: Vec<String> = pose.warning.iter().cloned().collect();
+    let mut warnings = optics_warnings(session, known.optics, frames.iter().map(|f| &f.optics));
+    warnings.extend(pose.warning.iter().cloned());
     let sheet_cells = exposures.cells_of_the_sheet(&cells)?;
-    exposures.check_levels(&sheet_cells, &mut warnings)?;
+    let brightest = exposures.check_levels(&sheet_cells)?;
+    warnings.extend(exposure_advice(&session.name, brightest));
     exposures.check_drift(&sheet_cells, &mut warnings);
     let samples = sheet_cells
         .iter()
@@ -100,7 +116,7 @@ pub(super) fn observe(
         cells: sheet_cells.into_iter().map(|(_, cell)| cell).collect(),
         samples,
     };
-    Ok(Observed { sheet, warnings })
+    Ok(Observed { sheet, warnings, brightest })
 }
 
 fn cell_side(camera: &Camera) -> usize {
@@ -124,15 +140,14 @@ fn grid(camera: &Camera) -> Vec<Rect> {
 
 fn average_all(
     session: &Session,
-    camera: &Camera,
-    color: &Color,
+    known: Known,
     rects: &[Rect],
     progress: &Progress,
 ) -> Result<Vec<Averaged>, CalibrateError> {
     let searched = frames_to_search(session);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let average = |(k, entry): (usize, &FrameEntry)| {
-        let averaged = average(session, entry, searched.contains(&k), camera, color, rects)?;
+        let averaged = average(session, entry, searched.contains(&k), known, rects)?;
         let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         progress(done as f64 / session.frames.len() as f64, &session.name);
         Ok(averaged)
@@ -155,19 +170,13 @@ fn average(
     session: &Session,
     entry: &FrameEntry,
     searched: bool,
-    camera: &Camera,
-    color: &Color,
+    known: Known,
     rects: &[Rect],
 ) -> Result<Averaged, CalibrateError> {
     let frame = read_frame(session, entry)?;
-    let camera_file = std::path::Path::new(crate::instrument::CAMERA_FILE);
-    check_size(
-        &session.frame_path(entry),
-        &frame,
-        camera_file,
-        [camera.width_px, camera.height_px],
-    )?;
-    let levels = Levels::of(&frame, color);
+    let size = [known.camera.width_px, known.camera.height_px];
+    check_size(&session.frame_path(entry), &frame, std::path::Path::new(CAMERA_FILE), size)?;
+    let levels = Levels::of(&frame, known.color);
     let board = session.target.as_ref().and_then(|target| target.board).filter(|_| searched);
     let board =
         board.map(|board| boards::detect(&grey_picture(&frame), &shape_of(&board))).transpose()?;
@@ -175,10 +184,28 @@ fn average(
         light: entry.light,
         drift_check: entry.drift_check,
         exposure: seconds_at_iso_100(entry),
-        cells: rects.iter().map(|rect| mean_in(&frame, &levels, *rect)).collect(),
+        cells: rects.iter().map(|rect| mean_in(&frame, &levels, known.defects, *rect)).collect(),
         pattern: Pattern::of(&frame),
         board: board.flatten().map(|corners| corners.refined),
+        optics: Optics::of(&frame.metadata),
     })
+}
+
+/// Another camera or lens than the calibrated one, told once a capture session.
+pub(super) fn optics_warnings<'a>(
+    session: &Session,
+    calibrated: &Optics,
+    mut frames: impl Iterator<Item = &'a Optics>,
+) -> Vec<String> {
+    let differences = |optics: &Optics| Some(calibrated.differences(optics));
+    let first = frames.find_map(|optics| differences(optics).filter(|found| !found.is_empty()));
+    let tell = |what: String| {
+        format!(
+            "{}: {what}; calibrate the camera again, or photograph with the calibrated one",
+            session.name
+        )
+    };
+    first.into_iter().flatten().map(tell).collect()
 }
 
 /// The sheet must not move between the frames.
@@ -415,12 +442,8 @@ impl Exposures<'_> {
         Ok(())
     }
 
-    /// A dead light is an error, a poor level a warning.
-    fn check_levels(
-        &self,
-        cells: &[(usize, Cell)],
-        warnings: &mut Vec<String>,
-    ) -> Result<(), CalibrateError> {
+    /// The level of the brightest light; a dead one is an error.
+    fn check_levels(&self, cells: &[(usize, Cell)]) -> Result<f64, CalibrateError> {
         let place = || self.session.manifest_path();
         let levels: Vec<f64> = (0..self.lights).map(|l| self.level(l, cells)).collect();
         let brightest = levels.iter().copied().fold(0.0, f64::max);
@@ -434,23 +457,7 @@ impl Exposures<'_> {
             let remedy = "check the LED, its wire and its channel in the rig file, and photograph this sheet again";
             return Err(CalibrateError::target(place(), what, remedy));
         }
-        if brightest > GOOD_LEVEL[1] {
-            warnings.push(format!(
-                "{}: the brightest light reaches {:.0} % of full scale, close to clipping; expose {:.1} times shorter",
-                self.session.name,
-                100.0 * brightest,
-                brightest / 0.7
-            ));
-        }
-        if brightest < GOOD_LEVEL[0] {
-            warnings.push(format!(
-                "{}: the brightest light reaches {:.0} % of full scale; expose {:.1} times longer (50 to 90 % is best)",
-                self.session.name,
-                100.0 * brightest,
-                0.7 / brightest
-            ));
-        }
-        Ok(())
+        Ok(brightest)
     }
 
     fn check_saturation(&self, cells: usize) -> Result<(), CalibrateError> {
@@ -508,6 +515,23 @@ impl Exposures<'_> {
             }
         }
     }
+}
+
+/// What to change of an exposure whose brightest light reaches `brightest` of full scale; nothing where that is good.
+pub(super) fn exposure_advice(name: &str, brightest: f64) -> Option<String> {
+    let percent = 100.0 * brightest;
+    if brightest > GOOD_LEVEL[1] {
+        return Some(format!(
+            "{name}: the brightest light reaches {percent:.0} % of full scale, close to clipping; expose {:.1} times shorter",
+            brightest / AIM_LEVEL
+        ));
+    }
+    (brightest < GOOD_LEVEL[0]).then(|| {
+        format!(
+            "{name}: the brightest light reaches {percent:.0} % of full scale; expose {:.1} times longer (50 to 90 % is best)",
+            AIM_LEVEL / brightest
+        )
+    })
 }
 
 /// Fewest cells that carry a fit.

@@ -2,6 +2,7 @@
 //! it most. A function of what lies in the folder: the window and `weavelight calibrate status` show the same.
 
 use super::CalibrateError;
+use super::sheet::exposure_advice;
 use crate::files::Provenance;
 use crate::instrument::{CalibratedLight, Calibration};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -19,6 +20,8 @@ pub struct Status {
     pub position_sigma_mm: Option<f64>,
     /// What to do next.
     pub next: String,
+    /// What to change of the exposures of the sheets that were used, if anything.
+    pub exposure: Vec<String>,
     /// What that would bring the position error to, where it can be foreseen.
     pub next_sigma_mm: Option<f64>,
 }
@@ -66,14 +69,37 @@ pub fn status(folder: &Path) -> Result<Status, CalibrateError> {
     if nothing {
         return Ok(describe(None));
     }
-    Ok(describe(Some(&Calibration::load(folder)?)))
+    let calibration = Calibration::load(folder)?;
+    let mut status = describe(Some(&calibration));
+    if calibration.lights_of_another_camera()? {
+        status.steps[2].state = StepState::Improvable;
+        status.steps[2].quality += "; measured with another camera.toml";
+        status.next = STALE_LIGHTS.to_owned();
+        status.next_sigma_mm = None;
+    }
+    Ok(status)
 }
+
+/// The camera was calibrated anew after the lights.
+const STALE_LIGHTS: &str = "run `calibrate lights` again on the same white sheets: the camera was calibrated after them, and the lights still stand in its old frame";
 
 fn describe(calibration: Option<&Calibration>) -> Status {
     let steps = vec![camera_step(calibration), color_step(calibration), lights_step(calibration)];
     let position_sigma_mm = calibration.and_then(|calibration| rms_sigma(&calibration.lights));
     let (next, next_sigma_mm) = next_action(calibration, &steps);
-    Status { steps, position_sigma_mm, next, next_sigma_mm }
+    let exposure = calibration.and_then(exposures).unwrap_or_default();
+    Status { steps, position_sigma_mm, next, exposure, next_sigma_mm }
+}
+
+/// The advice on each sheet's exposure.
+fn exposures(calibration: &Calibration) -> Option<Vec<String>> {
+    let quality = &calibration.provenance.lights.as_ref()?.quality;
+    let names = quality.get("sheet_names")?.as_array()?.iter();
+    let levels = quality.get("brightest_levels")?.as_array()?.iter();
+    let advice = |(name, level): (&toml::Value, &toml::Value)| {
+        exposure_advice(name.as_str()?, level.as_float()?)
+    };
+    Some(names.zip(levels).filter_map(advice).collect())
 }
 
 fn step(

@@ -161,6 +161,15 @@ fn camera_text(report: &calibrate::CameraReport) -> String {
     for ((name, value), sigma) in names.iter().zip(values).zip(report.sigma) {
         let _ = writeln!(text, "{name} {value:12.5} +- {sigma:.5}");
     }
+    let [rx, ry, rz, x, y, z] = report.pose_sigma;
+    let _ = writeln!(
+        text,
+        "pose over the table +- {rx:.4}, {ry:.4}, {rz:.4} degrees about x, y, z; +- {x:.3}, {y:.3}, {z:.3} mm"
+    );
+    text.push_str("corners found in each field of the picture:\n");
+    for row in report.coverage.chunks(report.coverage_grid[0]) {
+        let _ = writeln!(text, "{}", row.iter().map(|n| format!("{n:5}")).collect::<String>());
+    }
     for board in report.boards.iter().filter(|board| board.dropped.is_none()) {
         let _ = writeln!(text, "{}: {:.3} px", board.file, board.rms_px.unwrap_or(f64::NAN));
     }
@@ -236,6 +245,9 @@ fn status_text(status: &calibrate::Status) -> String {
     let foreseen = status
         .next_sigma_mm
         .map_or(String::new(), |sigma| format!(" (position error then about {sigma:.2} mm)"));
+    for advice in &status.exposure {
+        let _ = writeln!(text, "exposure: {advice}");
+    }
     let _ = writeln!(text, "next: {}{foreseen}", status.next);
     text
 }

@@ -113,9 +113,13 @@ fn text(report: &Report) -> String {
     let scale =
         report.mm_per_px.map_or_else(String::new, |scale| format!(", {scale:.4} mm per pixel"));
     let seconds: f64 = report.seconds.values().sum();
+    let defective = match report.defective_pixels {
+        0 => String::new(),
+        count => format!(", {count} defective photosites left out"),
+    };
     format!(
         "{:.1} % of {} photosites solved from {} lights{scale}\n\
-         robust path {:.2} %, clipped samples at {:.2} %, residual {:.5} of white, albedo in {}, {seconds:.1} s",
+         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, albedo in {}, {seconds:.1} s",
         percent(report.solved),
         report.pixels,
         report.lights_used.len(),

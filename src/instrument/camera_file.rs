@@ -1,5 +1,6 @@
 //! `camera.toml`: the keys of the format, to and from [`Camera`].
 
+use super::Optics;
 use super::rig_file::{check_positive, check_size};
 use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
@@ -29,13 +30,38 @@ struct CameraFile {
     rotation: [[f64; 3]; 3],
     translation_mm: [f64; 3],
     rms_reprojection_px: Option<f64>,
+    camera_model: Option<String>,
+    lens: Option<String>,
+    focal_length_mm: Option<f64>,
     #[serde(default)]
     provenance: ProvenanceTable,
 }
 
-type Read = (Camera, Option<f64>, Provenance);
+/// A camera and what is known of its measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredCamera {
+    /// The camera.
+    pub camera: Camera,
+    /// Root mean square distance of the board's corners from where the model puts them.
+    pub rms_reprojection_px: Option<f64>,
+    /// The camera and lens that took the boards.
+    pub optics: Optics,
+}
 
-/// The folder's camera with its reprojection error, or `None` where there is no such file.
+impl MeasuredCamera {
+    /// A camera of which nothing else is known.
+    pub fn new(camera: Camera) -> Self {
+        Self { camera, rms_reprojection_px: None, optics: Optics::default() }
+    }
+}
+
+/// What the file holds.
+pub(super) struct Read {
+    pub(super) measured: MeasuredCamera,
+    pub(super) provenance: Provenance,
+}
+
+/// The folder's camera, or `None` where there is no such file.
 pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
     let path = folder.join(CAMERA_FILE);
     if !path.exists() {
@@ -44,7 +70,13 @@ pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
     let document = Document::read(&path)?;
     let file: CameraFile = document.parse(SCHEMA)?;
     let camera = camera_from_file(&document, &file)?;
-    Ok(Some((camera, file.rms_reprojection_px, file.provenance.into())))
+    let optics = Optics {
+        camera_model: file.camera_model,
+        lens: file.lens,
+        focal_length_mm: file.focal_length_mm,
+    };
+    let measured = MeasuredCamera { camera, rms_reprojection_px: file.rms_reprojection_px, optics };
+    Ok(Some(Read { measured, provenance: file.provenance.into() }))
 }
 
 /// Writes `camera.toml` into a calibration folder, which is made where absent.
@@ -53,11 +85,11 @@ pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
 /// Where it cannot be written.
 pub fn write_camera(
     folder: &Path,
-    camera: &Camera,
-    rms_reprojection_px: Option<f64>,
+    measured: &MeasuredCamera,
     provenance: &Provenance,
 ) -> Result<(), FileError> {
     std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    let MeasuredCamera { camera, rms_reprojection_px, optics } = measured;
     let pose = &camera.camera_from_rig;
     let file = CameraFile {
         schema: SCHEMA,
@@ -71,7 +103,10 @@ pub fn write_camera(
         // nalgebra stores columns; the file has rows.
         rotation: pose.rotation.matrix().transpose().into(),
         translation_mm: pose.translation.vector.into(),
-        rms_reprojection_px,
+        rms_reprojection_px: *rms_reprojection_px,
+        camera_model: optics.camera_model.clone(),
+        lens: optics.lens.clone(),
+        focal_length_mm: optics.focal_length_mm,
         provenance: provenance.into(),
     };
     write_toml(&folder.join(CAMERA_FILE), &file)
@@ -82,6 +117,7 @@ fn camera_from_file(document: &Document, file: &CameraFile) -> Result<Camera, Fi
     check_size(document, "height_px", file.height_px)?;
     check_positive(document, "fx", Some(file.fx))?;
     check_positive(document, "fy", Some(file.fy))?;
+    check_positive(document, "focal_length_mm", file.focal_length_mm)?;
     let rotation = rotation_from_rows(document, &file.rotation)?;
     if file.translation_mm[2] <= 0.0 {
         let what = "puts the scan area behind the camera; its z must be positive";

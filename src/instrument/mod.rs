@@ -3,16 +3,22 @@
 mod calibration;
 mod camera_file;
 mod color_file;
+mod defects;
+mod defects_file;
 mod gain_map;
 mod lights_file;
+mod optics;
 mod rig_file;
 #[cfg(test)]
 mod tests;
 
 pub use calibration::CalibrationProvenance;
-pub use camera_file::{CAMERA_FILE, write_camera};
+pub use camera_file::{CAMERA_FILE, MeasuredCamera, write_camera};
 pub use color_file::{COLOR_FILE, write_color};
+pub use defects::Defects;
+pub use defects_file::{DEFECTS_FILE, write_defects};
 pub use lights_file::{LIGHTS_FILE, write_lights};
+pub use optics::Optics;
 
 use nalgebra::{Matrix3, Point3, UnitVector3};
 use std::ops::RangeInclusive;
@@ -118,8 +124,12 @@ pub struct Calibration {
     pub camera: Option<Camera>,
     /// Root mean square distance of the board's corners from where the camera model puts them.
     pub rms_reprojection_px: Option<f64>,
+    /// The camera and lens that took the boards.
+    pub optics: Optics,
     /// `color.toml`; where there is none, everything comes from the frames.
     pub color: Color,
+    /// `defects.toml`; none where there is no such file.
+    pub defects: Defects,
     /// `lights.toml`, in the rig's order; empty before `calibrate lights`.
     pub lights: Vec<CalibratedLight>,
     /// What each file records of its making.

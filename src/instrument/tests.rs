@@ -202,9 +202,19 @@ fn a_calibration_grows_file_by_file_and_is_read_as_written() {
     let home = tempfile::tempdir().unwrap();
     let folder = home.path().join("calibration");
     assert!(Calibration::load(&folder).unwrap_err().to_string().contains("lights.toml: not found"));
-    write_camera(&folder, &camera(), Some(0.24), &provenance()).unwrap();
+    let measured = MeasuredCamera {
+        camera: camera(),
+        rms_reprojection_px: Some(0.24),
+        optics: Optics {
+            camera_model: Some("Nikon D5100".into()),
+            lens: None,
+            focal_length_mm: Some(40.0),
+        },
+    };
+    write_camera(&folder, &measured, &provenance()).unwrap();
     let first = Calibration::load(&folder).unwrap();
     assert_eq!((first.camera.as_ref(), first.rms_reprojection_px), (Some(&camera()), Some(0.24)));
+    assert_eq!(first.optics, measured.optics);
     assert_eq!((first.color, first.lights.len()), (Color::default(), 0));
     assert_eq!(first.provenance.camera, Some(provenance()));
 
@@ -218,8 +228,10 @@ fn a_calibration_grows_file_by_file_and_is_read_as_written() {
     };
     write_color(&folder, &color, &provenance()).unwrap();
     write_lights(&folder, &lights(), &provenance()).unwrap();
+    let defects = Defects::new(vec![[7, 1], [3, 0]], vec![[5, 5]]);
+    write_defects(&folder, &defects, &provenance()).unwrap();
     let whole = Calibration::load(&folder).unwrap();
-    assert_eq!(whole.color, color);
+    assert_eq!((&whole.color, &whole.defects), (&color, &defects));
     for (found, expected) in whole.lights.iter().zip(&lights()) {
         assert!(same_light(&found.light, &expected.light), "{found:?}");
         assert_eq!(found.gain_map, expected.gain_map);

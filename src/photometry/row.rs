@@ -139,6 +139,8 @@ pub enum Outcome {
     NoSurface,
     /// Outside the mask. The kernels never say so (they see only NaN, hence `TooFewLights`); the solve does.
     Masked,
+    /// The calibration lists the photosite as hot or dead; told apart by the solve as `Masked` is.
+    Defective,
 }
 
 /// A row whose parts do not belong together.

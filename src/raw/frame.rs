@@ -62,6 +62,8 @@ pub struct Metadata {
     pub iso: Option<f64>,
     /// Focal length in millimetres.
     pub focal_length_mm: Option<f64>,
+    /// The lens, as the camera names it.
+    pub lens: Option<String>,
     /// Row-major XYZ-to-camera matrix, scaled as usual (1.0 = 1), for illuminant D65 if there are several.
     pub camera_from_xyz: Option<[[f64; 3]; 3]>,
     /// Exif orientation; recorded, never applied.

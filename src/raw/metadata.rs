@@ -16,6 +16,7 @@ pub(crate) fn from_tiff(tiff: &Tiff) -> Metadata {
             .filter(|&iso| iso < 65_535.0)
             .or_else(|| positive(tag::RECOMMENDED_EXPOSURE_INDEX)),
         focal_length_mm: positive(tag::FOCAL_LENGTH),
+        lens: text(tag::LENS_MODEL).filter(|lens| !lens.is_empty()),
         camera_from_xyz: color_matrix(tiff),
         orientation: tiff.directories[0]
             .integer(tag::ORIENTATION)

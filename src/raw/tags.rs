@@ -37,6 +37,7 @@ pub(crate) mod tag {
     pub(crate) const RECOMMENDED_EXPOSURE_INDEX: u16 = 0x8832;
     pub(crate) const FOCAL_LENGTH: u16 = 0x920a;
     pub(crate) const MAKER_NOTE: u16 = 0x927c;
+    pub(crate) const LENS_MODEL: u16 = 0xa434;
     pub(crate) const DNG_VERSION: u16 = 0xc612;
     pub(crate) const CFA_LAYOUT: u16 = 0xc617;
     pub(crate) const LINEARIZATION_TABLE: u16 = 0xc618;

@@ -1,8 +1,8 @@
 use super::{Options, Scene, SimulateError};
 use crate::files::{Provenance, sha256_of_file};
 use crate::instrument::{
-    CalibratedLight, CameraKind, Color, Controller, Noise, Rig, RigCamera, RigLight, RigLightPlace,
-    write_camera, write_color, write_lights,
+    CalibratedLight, CameraKind, Color, Controller, MeasuredCamera, Noise, Optics, Rig, RigCamera,
+    RigLight, RigLightPlace, write_camera, write_color, write_lights,
 };
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::path::{Path, PathBuf};
@@ -83,6 +83,18 @@ impl Instrument {
         [sum(0) / sum(1), 1.0, sum(2) / sum(1)]
     }
 
+    /// What the frames' files say of camera and lens.
+    pub fn optics(&self) -> Optics {
+        let camera = &self.rig.camera;
+        let model = camera.model.as_deref().unwrap_or("Weavelight Simulator");
+        let focal_length_mm = camera.focal_length_mm;
+        Optics {
+            camera_model: Some(model.to_owned()),
+            lens: focal_length_mm.map(|focal| format!("Simulated {focal} mm")),
+            focal_length_mm,
+        }
+    }
+
     /// DNG's colour matrix.
     pub fn camera_from_xyz(&self) -> [[f64; 3]; 3] {
         let matrix = camera_from_xyz(self.neutral());
@@ -101,7 +113,12 @@ impl Instrument {
         quality.insert("seed".to_owned(), i64::try_from(options.seed).unwrap_or(i64::MAX).into());
         let provenance = Provenance::of_this_program(None, vec![input], quality);
         let calibration = folder.join("calibration");
-        write_camera(&calibration, &self.stage.view.camera, Some(0.0), &provenance)?;
+        let measured = MeasuredCamera {
+            rms_reprojection_px: Some(0.0),
+            optics: self.optics(),
+            ..MeasuredCamera::new(self.stage.view.camera.clone())
+        };
+        write_camera(&calibration, &measured, &provenance)?;
         write_color(&calibration, &self.color(), &provenance)?;
         write_lights(&calibration, &self.calibrated_lights(), &provenance)?;
         Ok(())

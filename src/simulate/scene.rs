@@ -166,7 +166,7 @@ fn scene_from_document(document: &Document, rig: &Path) -> Result<Scene, FileErr
     Ok(Scene {
         rig: rig.to_owned(),
         seed: file.seed,
-        material: material(document, file.material)?,
+        material: material(document, &file.material)?,
         flaws: flaws(&file.flaws),
         places: places.collect::<Result<_, _>>()?,
     })
@@ -187,7 +187,7 @@ fn place(document: &Document, k: usize, table: &PlaceTable) -> Result<RigLightPl
     }
 }
 
-fn material(document: &Document, table: MaterialTable) -> Result<Material, FileError> {
+fn material(document: &Document, table: &MaterialTable) -> Result<Material, FileError> {
     let unknown = |key: &str, name: &str, known: Vec<&str>| {
         document.invalid(key, &format!("is \"{name}\"; choose one of {}", known.join(", ")))
     };

@@ -97,8 +97,8 @@ impl Instrument {
         captured: Option<jiff::Timestamp>,
     ) -> std::io::Result<Vec<u8>> {
         let [width, height] = self.size_px();
-        let camera = &self.rig.camera;
-        let name = camera.model.as_deref().unwrap_or("Weavelight Simulator");
+        let optics = self.optics();
+        let name = optics.camera_model.as_deref().unwrap_or_default();
         let (make, model) = name.split_once(' ').unwrap_or(("Weavelight", name));
         let date_time =
             captured.map_or_else(String::new, |at| at.strftime("%Y:%m:%d %H:%M:%S").to_string());
@@ -115,7 +115,8 @@ impl Instrument {
             date_time: &date_time,
             exposure_s,
             iso,
-            focal_length_mm: camera.focal_length_mm.unwrap_or(0.0),
+            focal_length_mm: optics.focal_length_mm.unwrap_or(0.0),
+            lens: optics.lens.as_deref().unwrap_or_default(),
             neutral: self.neutral(),
             camera_from_xyz: self.camera_from_xyz(),
         };

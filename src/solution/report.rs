@@ -27,6 +27,9 @@ pub struct Report {
     pub robust_pixels: u64,
     /// Those with at least one clipped sample.
     pub saturated_pixels: u64,
+    /// Those that the calibration lists as hot or dead; they have no normal.
+    #[serde(default)]
+    pub defective_pixels: u64,
     /// Photosites by what became of them, as in "too_few_lights".
     #[serde(default)]
     pub outcomes: BTreeMap<String, u64>,
@@ -123,6 +126,7 @@ mod tests {
             solved: 5,
             robust_pixels: 1,
             saturated_pixels: 0,
+            defective_pixels: 2,
             outcomes: [("masked".to_owned(), 1)].into(),
             residual_rms: Some(1.0 / 3.0),
             seconds: [("decode".to_owned(), 0.25)].into(),

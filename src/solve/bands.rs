@@ -196,6 +196,7 @@ impl<'a> Run<'a> {
         if self.scene.layout == Layout::Rgb {
             albedo_of_channels(rows, &input.field, &output, &mut band.rgb[span]);
         }
+        self.mark_defects(y, columns.clone(), output.outcome);
         if let Some(inside) = inside {
             let outside = inside.iter().enumerate().filter(|(_, inside)| !**inside);
             outside.for_each(|(column, _)| {
@@ -206,6 +207,13 @@ impl<'a> Run<'a> {
         counts.add_row(output.outcome, output.residual);
         counts.outcomes[Outcome::Masked as usize] += self.scene.width - columns.len();
         counts.saturated += rows.saturated.iter().filter(|&&saturated| saturated).count();
+    }
+
+    fn mark_defects(&self, y: usize, columns: Range<usize>, outcome: &mut [Outcome]) {
+        let defects = self.scene.defects.columns(y, columns.start);
+        for column in defects.take_while(|x| *x < columns.end) {
+            outcome[column - columns.start] = Outcome::Defective;
+        }
     }
 
     /// Photosites at which some exposures of a light clip and others do not have variances of their own: solved again,

@@ -2,7 +2,7 @@
 
 use super::{Options, SolveError};
 use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
-use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE};
+use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE};
 use crate::session::Session;
 use crate::solution::{self, REPORT_JSON, Report};
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ pub(crate) fn key(
     Ok(sha256_hex(text.as_bytes()))
 }
 
-/// The calibration's three files and its gain maps, by name.
+/// The calibration's files and its gain maps, by name.
 fn calibration_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let failed = |source| FileError::read(folder, source);
     let entries = std::fs::read_dir(folder).map_err(failed)?;
@@ -52,7 +52,8 @@ fn calibration_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     paths.retain(|path| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         path.is_file()
-            && ([CAMERA_FILE, COLOR_FILE, LIGHTS_FILE].contains(&&*name) || name.ends_with(".exr"))
+            && ([CAMERA_FILE, COLOR_FILE, DEFECTS_FILE, LIGHTS_FILE].contains(&&*name)
+                || name.ends_with(".exr"))
     });
     paths.sort();
     Ok(paths)

@@ -5,7 +5,7 @@ use super::in_memory::leave_out_dark_lights;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
-use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE};
+use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
 use crate::raster::{Values, decode_picture};
 use crate::raw::{Encoding, Frame, Hint, ReadError, decode};
 use crate::session::{self, FrameEntry, Kind, Session};
@@ -47,7 +47,9 @@ pub(crate) fn load(
 ) -> Result<Loaded, SolveError> {
     check_folders(session, &calibration)?;
     let mut warnings = unphotographed(session, &calibration);
+    warnings.extend(stale_lights(&calibration)?);
     let frames = read_frames(session, progress)?;
+    warnings.extend(other_optics(session, &frames, &calibration));
     let (drift, frames): (Vec<_>, Vec<_>) =
         session.frames.iter().zip(frames).partition(|(entry, _)| entry.drift_check);
     let mut scene = arrange(session, calibration, frames);
@@ -124,6 +126,34 @@ fn unphotographed(session: &Session, calibration: &Calibration) -> Vec<String> {
             vec![format!("Lights {names} have no frames; solved with the other {}.", there.len())]
         }
     }
+}
+
+/// Lights measured in the rig frame of a camera that is no longer the calibration's.
+fn stale_lights(calibration: &Calibration) -> Result<Option<String>, SolveError> {
+    let stale = calibration.lights_of_another_camera()?;
+    Ok(stale.then(|| {
+        format!(
+            "{}: the lights were calibrated with another camera.toml than the one beside them; run `weavelight calibrate lights` again.",
+            calibration.folder.join(LIGHTS_FILE).display()
+        )
+    }))
+}
+
+/// A camera or lens other than the calibrated one, told once for the first frame that shows it.
+fn other_optics(session: &Session, frames: &[Frame], calibration: &Calibration) -> Vec<String> {
+    let differences = |frame: &Frame| calibration.optics.differences(&Optics::of(&frame.metadata));
+    let first = session.frames.iter().zip(frames).find_map(|(entry, frame)| {
+        let found = differences(frame);
+        (!found.is_empty()).then_some((entry, found))
+    });
+    let Some((entry, found)) = first else { return vec![] };
+    let file = entry.file.display();
+    let tell = |what: &String| {
+        format!(
+            "{file}: {what}; where that is so, positions and shading are wrong: calibrate again."
+        )
+    };
+    found.iter().map(tell).collect()
 }
 
 /// Decodes every frame, several at once; in the manifest's order.
@@ -213,6 +243,7 @@ fn arrange(
         camera: calibration.camera,
         plane: session.plane_or_table(),
         color: calibration.color,
+        defects: calibration.defects,
         mask: None,
         origin: Origin { session: session.manifest_path(), calibration: calibration.folder },
     }

@@ -41,7 +41,7 @@ pub struct Counts {
 }
 
 /// Variants of [`Outcome`].
-pub const OUTCOMES: usize = 8;
+pub const OUTCOMES: usize = 9;
 
 impl Counts {
     /// How many photosites came to `outcome`.

@@ -72,6 +72,7 @@ impl Accumulator {
             camera: calibration.camera.clone(),
             plane,
             color: calibration.color.clone(),
+            defects: calibration.defects.clone(),
             mask: None,
             origin: Origin { session: "the scan".into(), calibration: calibration.folder.clone() },
         };
@@ -329,12 +330,20 @@ impl Worker<'_, '_> {
         });
         for y in row * scale..((row + 1) * scale).min(scene.height) {
             normalizer.row(y, 0..scene.width, &mut self.signals);
+            let channel_of = |plane: usize, x: usize| match scene.layout {
+                Layout::Mosaic(cfa) if channels == 3 => cfa.channel(x, y) as usize,
+                _ => plane,
+            };
+            // A defective photosite counts for nothing, not even as clipped.
+            for x in scene.defects.columns(y, 0).take_while(|x| *x < scene.width) {
+                for (plane, signal) in self.signals.planes.iter_mut().enumerate() {
+                    signal[x] = 0.0;
+                    counts[channel_of(plane, x)][x / scale] -= 1.0;
+                }
+            }
             for (plane, signal) in self.signals.planes.iter().enumerate() {
                 for (x, value) in signal.iter().enumerate() {
-                    let channel = match scene.layout {
-                        Layout::Mosaic(cfa) if channels == 3 => cfa.channel(x, y) as usize,
-                        _ => plane,
-                    };
+                    let channel = channel_of(plane, x);
                     self.bins[channel][x / scale] += value;
                     counts[channel][x / scale] += 1.0;
                 }

@@ -28,9 +28,11 @@ fn signal(run: &Run, light: usize, x: usize, y: usize, place: usize) -> (f64, Va
     let scene = run.scene();
     let channels = scene.layout.channels();
     let exposures = &scene.lights[light].exposures;
+    let defective = scene.defects.columns(y, x).next() == Some(x);
     let usable = |e: &usize| {
-        (0..channels)
-            .all(|c| !Reading::new(&exposures[*e].frame, &scene.color).exact(x, y, c).is_nan())
+        !defective
+            && (0..channels)
+                .all(|c| !Reading::new(&exposures[*e].frame, &scene.color).exact(x, y, c).is_nan())
     };
     let used: Vec<usize> = (0..exposures.len()).filter(usable).collect();
     let bits = used.iter().fold(0_u64, |bits, e| bits | 1 << e);

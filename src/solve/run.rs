@@ -11,7 +11,9 @@ use super::options::{Grid, Options, Reuse};
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Scene};
 use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
-use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE, write_camera};
+use crate::instrument::{
+    CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE, MeasuredCamera, write_camera,
+};
 use crate::photometry::{Method, Outcome};
 use crate::raw::preview;
 use crate::session::Session;
@@ -215,7 +217,9 @@ fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), Solv
             let copied = std::fs::copy(&rest.calibrated_camera, &target);
             copied.map_err(|source| crate::files::FileError::write(&target, source))?;
         }
-        Grid::Undistorted => write_camera(folder, &pinhole(camera), None, &Default::default())?,
+        Grid::Undistorted => {
+            write_camera(folder, &MeasuredCamera::new(pinhole(camera)), &Default::default())?;
+        }
     }
     Ok(())
 }
@@ -236,6 +240,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         solved: maps.mask.data.iter().filter(|&&solved| solved != 0).count() as u64,
         robust_pixels: counts.robust() as u64,
         saturated_pixels: counts.saturated as u64,
+        defective_pixels: counts.of(Outcome::Defective) as u64,
         outcomes: outcomes(&counts),
         residual_rms: (counts.solved() > 0).then(|| counts.residual_rms()),
         seconds: BTreeMap::new(),
@@ -272,6 +277,7 @@ fn outcomes(counts: &Counts) -> BTreeMap<String, u64> {
         (Outcome::CoplanarLights, "coplanar_lights"),
         (Outcome::NoSurface, "no_surface"),
         (Outcome::Masked, "masked"),
+        (Outcome::Defective, "defective"),
     ];
     names.into_iter().map(|(outcome, name)| (name.to_owned(), counts.of(outcome) as u64)).collect()
 }
@@ -287,7 +293,8 @@ fn mm_per_px(camera: &Camera, plane: &Plane) -> Option<f64> {
 }
 
 fn inputs(session: &Session, calibration: &Calibration) -> Result<Vec<Input>, SolveError> {
-    let files = [CAMERA_FILE, COLOR_FILE, LIGHTS_FILE].map(|name| calibration.folder.join(name));
+    let files = [CAMERA_FILE, COLOR_FILE, DEFECTS_FILE, LIGHTS_FILE];
+    let files = files.map(|name| calibration.folder.join(name));
     let files = std::iter::once(session.manifest_path()).chain(files).filter(|path| path.exists());
     let input = |path: std::path::PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,6 +1,6 @@
 //! Everything a solve needs, decoded and checked, in memory.
 
-use crate::instrument::{CalibratedLight, Color};
+use crate::instrument::{CalibratedLight, Color, Defects};
 use crate::raw::{Frame, Layout};
 use std::path::PathBuf;
 use weavelight_calibration::description::{Camera, Image, Plane};
@@ -24,6 +24,8 @@ pub struct Scene {
     pub plane: Plane,
     /// What the calibration says of the sensor.
     pub color: Color,
+    /// Photosites that do not measure light; they stay unsolved.
+    pub defects: Defects,
     /// True where the swatch is, row by row; `None`: everywhere.
     pub mask: Option<Image<bool>>,
     /// Where all of it came from, for messages.

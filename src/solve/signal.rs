@@ -5,6 +5,7 @@
 use super::gain::GainRows;
 use super::scene::{Exposure, Scene};
 use super::sensor::{GREY, Reading, intensity_of_places};
+use crate::instrument::Defects;
 use crate::raw::Layout;
 use std::ops::Range;
 
@@ -15,6 +16,7 @@ pub(crate) struct Normalizer<'a> {
     lights: Vec<LightPlan<'a>>,
     /// Ambient frames with the factors that make their sum a rate per second at ISO 100.
     ambient: Vec<(Reading<'a>, [f32; 4])>,
+    defects: &'a Defects,
     frame_px: (usize, usize),
 }
 
@@ -74,6 +76,7 @@ impl<'a> Normalizer<'a> {
             channels,
             lights: lights.collect(),
             ambient: ambient_plan(scene),
+            defects: &scene.defects,
             frame_px,
         }
     }
@@ -85,7 +88,8 @@ impl<'a> Normalizer<'a> {
         for (light, plan) in self.lights.iter().enumerate() {
             self.light_row(light, plan, y, columns.clone(), rows);
         }
-        self.divide_by_gain(y, columns, rows);
+        self.divide_by_gain(y, columns.clone(), rows);
+        self.leave_out_defects(y, columns, rows);
         if self.layout == Layout::Rgb {
             rows.mix_grey();
         }
@@ -181,6 +185,15 @@ impl<'a> Normalizer<'a> {
         for plane in planes {
             // 0 / 0, not a number, where every exposure clips.
             plane.iter_mut().zip(total_weight.iter()).for_each(|(value, total)| *value /= total);
+        }
+    }
+
+    /// A defective photosite measures no light: no sample of it is usable, and that one of them clips says nothing.
+    fn leave_out_defects(&self, y: usize, columns: Range<usize>, rows: &mut SignalRows) {
+        for column in self.defects.columns(y, columns.start).take_while(|x| *x < columns.end) {
+            let at = column - columns.start;
+            rows.planes.iter_mut().for_each(|plane| plane[at] = f32::NAN);
+            rows.saturated[at] = false;
         }
     }
 

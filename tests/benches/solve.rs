@@ -107,7 +107,9 @@ fn previews(name: &str, scale: Scale, scene: &mut Scene, touch: Duration) {
         folder: PathBuf::from("bench"),
         camera: scene.camera.clone(),
         rms_reprojection_px: None,
+        optics: Default::default(),
         color: scene.color.clone(),
+        defects: Default::default(),
         lights: scene.lights.iter().map(|light| light.calibrated.clone()).collect(),
         provenance: Default::default(),
     };
@@ -242,6 +244,7 @@ fn scene(width: usize, height: usize) -> Scene {
             }),
             ..Color::default()
         },
+        defects: Default::default(),
         mask: None,
         origin: Origin::default(),
     }

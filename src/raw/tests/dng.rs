@@ -108,6 +108,7 @@ pub(super) fn entries(kind: Kind, extra: Entries) -> Entries {
                 (tag::EXPOSURE_TIME, Value::Rational(vec![[1, 125]])),
                 (tag::ISO, short(200)),
                 (tag::FOCAL_LENGTH, Value::Rational(vec![[350, 10]])),
+                (tag::LENS_MODEL, Value::Ascii("Bench 35 mm")),
             ]),
         ),
     ];
@@ -220,6 +221,7 @@ fn metadata_is_read_and_orientation_not_applied() {
     assert_eq!(metadata.camera.as_deref(), Some("Weavelight Bench"));
     assert_eq!(metadata.exposure_s, Some(1.0 / 125.0));
     assert_eq!((metadata.iso, metadata.focal_length_mm), (Some(200.0), Some(35.0)));
+    assert_eq!(metadata.lens.as_deref(), Some("Bench 35 mm"));
     assert_eq!(metadata.orientation, Some(6));
     assert_eq!(metadata.camera_from_xyz.unwrap()[0], [-0.2, -0.1, 0.0]);
     assert_eq!(metadata.camera_from_xyz.unwrap()[2], [0.4, 0.5, 0.6]);

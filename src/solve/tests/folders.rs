@@ -3,7 +3,7 @@
 use super::super::*;
 use super::scenes::{Recipe, scene};
 use crate::files::Provenance;
-use crate::instrument::{write_camera, write_color, write_lights};
+use crate::instrument::{MeasuredCamera, write_camera, write_color, write_lights};
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
 use crate::session::{FrameEntry, Kind, Session};
@@ -23,7 +23,8 @@ impl Folders {
         let root = tempfile::tempdir().unwrap();
         let calibration = root.path().join("calibration");
         let none = Provenance::default();
-        write_camera(&calibration, scene.camera.as_ref().unwrap(), None, &none).unwrap();
+        let camera = MeasuredCamera::new(scene.camera.clone().unwrap());
+        write_camera(&calibration, &camera, &none).unwrap();
         write_color(&calibration, &scene.color, &none).unwrap();
         let lights: Vec<_> = scene.lights.iter().map(|light| light.calibrated.clone()).collect();
         write_lights(&calibration, &lights, &none).unwrap();

@@ -17,7 +17,9 @@ fn preview(scene: &Scene, scale: Scale, order: &[usize]) -> Option<Preview> {
         folder: "made".into(),
         camera: scene.camera.clone(),
         rms_reprojection_px: None,
+        optics: Default::default(),
         color: scene.color.clone(),
+        defects: scene.defects.clone(),
         lights: scene.lights.iter().map(|light| light.calibrated.clone()).collect(),
         provenance: CalibrationProvenance::default(),
     };

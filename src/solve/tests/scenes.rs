@@ -131,6 +131,7 @@ pub(super) fn scene(recipe: Recipe) -> Scene {
         camera: Some(camera),
         plane,
         color,
+        defects: Default::default(),
         mask: None,
         origin: Origin {
             session: "made/session.toml".into(),
