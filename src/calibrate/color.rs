@@ -209,7 +209,8 @@ fn levels(chart: &Chart, color: &Color) -> Levels {
 /// Highest share of the range that still counts as dark: whatever bends the response does not show there.
 const DARK_SHARE: f64 = 0.08;
 
-/// Where one light at several exposures meets exposure zero, else what the file says.
+/// Where one light at several exposures meets exposure zero; else where the grey patches of the ambient frame meet
+/// reflectance zero; else what the file says.
 fn black_level(chart: &Chart) -> ([f64; 4], &'static str) {
     let stated = chart.frames[0].black.map(f64::from);
     let range = f64::from(chart.frames[0].saturation[0]) - stated[0];
@@ -229,8 +230,36 @@ fn black_level(chart: &Chart) -> ([f64; 4], &'static str) {
     let fitted: Vec<f64> = (0..4).filter_map(of_place).collect();
     match <[f64; 4]>::try_from(fitted) {
         Ok(black) => (black, "one light at several exposures, extrapolated to none"),
-        Err(_) => (stated, "the frames' own files"),
+        Err(_) => black_of_ambient(chart, range)
+            .map_or((stated, "the frames' own files"), |black| {
+                (black, "the ambient frame, extrapolated to a patch that reflects nothing")
+            }),
     }
+}
+
+/// Ambient light is uneven over the chart: above this share of the range that would show in the black level.
+const AMBIENT_SHARE: f64 = 0.02;
+
+/// Grey patches under the same weak light: what they read over their reflectance meets black at reflectance 0.
+fn black_of_ambient(chart: &Chart, range: f64) -> Option<[f64; 4]> {
+    let stated = chart.frames[0].black.map(f64::from);
+    let of_place = |place: usize| {
+        let mut readings = Vec::new();
+        for (series, frame) in chart.frames.iter().filter(|f| f.light.is_none()).enumerate() {
+            for (patch, stats) in
+                chart.patches.iter().zip(&frame.patches).filter(|(p, _)| neutral(p))
+            {
+                let sigma = (stats.variance[place] / stats.count[place]).sqrt();
+                let (exposure, value) = (patch.reflectance, stats.mean[place]);
+                readings.push(Reading { series, exposure, value, sigma });
+            }
+        }
+        let dark = readings.iter().all(|r| r.value - stated[place] < AMBIENT_SHARE * range);
+        let found = fit_black(&readings).filter(|_| dark);
+        found.filter(|[_, sigma]| *sigma < BLACK_SIGMA_SHARE * range).map(|[black, _]| black)
+    };
+    let found: Vec<f64> = (0..4).filter_map(of_place).collect();
+    found.try_into().ok()
 }
 
 /// A black level known worse than this share of the range is not used.

@@ -38,6 +38,18 @@ fn a_bent_response_is_corrected_and_a_nearly_straight_one_left_alone() {
     assert_eq!(color.response, [0.0, 1.0], "{:?}", color.nonlinearity);
 }
 
+#[test]
+fn without_several_exposures_black_comes_from_the_ambient_frame() {
+    let bench = Bench::new(&[Part::Grey], |o| o.flaws.ambient = 2.0);
+    let mut session = Session::load(&bench.rig("grey")).unwrap();
+    session.frames.retain(|entry| !entry.file.to_string_lossy().contains("exposure"));
+    session.save().unwrap();
+    let color = bench.color().unwrap();
+    assert!(color.black_from.contains("ambient"), "{}", color.black_from);
+    assert!(color.black_level.iter().all(|b| (b - 600.0).abs() < 1.0), "{:?}", color.black_level);
+    assert!(color.warnings.iter().any(|w| w.contains("linearity was not tested")));
+}
+
 /// Photosites of the simulated sensor that read the same number in every frame: stuck at the top, stuck at black.
 fn stuck(bench: &Bench, session: &str) -> Defects {
     let session = Session::load(&bench.rig(session)).unwrap();
