@@ -9,6 +9,8 @@ const LEFT: f64 = 58.0;
 const RIGHT: f64 = 14.0;
 const TOP: f64 = 42.0;
 const BOTTOM: f64 = 46.0;
+/// What an axis shows beyond the outermost values, as a factor.
+const MARGIN: f64 = 1.25;
 /// Panels side by side.
 const COLUMNS: usize = 2;
 /// Height of a label and width of one of its letters, about.
@@ -169,7 +171,8 @@ impl Panel {
             put(
                 out,
                 format_args!(
-                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"{}\">{}</text>",
+                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"{}\" \
+                     stroke=\"white\" stroke-width=\"3\" paint-order=\"stroke\">{}</text>",
                     area.middle[0],
                     area.middle[1] + 4.0,
                     mark.color,
@@ -244,7 +247,7 @@ impl Scale {
         if least > most {
             (least, most) = (1.0, 1.0);
         }
-        Self { values: [least / 1.4, most * 1.4], pixels }
+        Self { values: [least / MARGIN, most * MARGIN], pixels }
     }
 
     fn place(&self, value: f64) -> f64 {
@@ -253,10 +256,14 @@ impl Scale {
         self.pixels[0] + share.min(1.0) * (self.pixels[1] - self.pixels[0])
     }
 
-    /// Round numbers inside: 1, 2, 5 of every decade, or whole decades where there are many.
+    /// Round numbers inside, as many as the range takes.
     fn ticks(&self) -> Vec<f64> {
         let decades = self.values.map(|value| value.log10().floor() as i32);
-        let digits: &[f64] = if decades[1] - decades[0] > 2 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let digits: &[f64] = match self.values[1] / self.values[0] {
+            ..10.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+            10.0..300.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0],
+        };
         let all = (decades[0]..=decades[1])
             .flat_map(|decade| digits.iter().map(move |digit| digit_of(*digit, decade)));
         all.filter(|value| (self.values[0]..=self.values[1]).contains(value)).collect()
@@ -279,7 +286,8 @@ mod tests {
             let scale = Scale::around(values.iter().copied(), [0.0, 100.0]);
             assert_eq!(scale.ticks(), expected, "{values:?}");
         };
-        check(&[0.5, 3.0], &[0.5, 1.0, 2.0]);
+        check(&[0.55, 2.0], &[0.5, 0.7, 1.0, 1.5, 2.0]);
+        check(&[0.5, 30.0], &[0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
         check(&[1.0, 20_000.0], &[1.0, 10.0, 100.0, 1000.0, 10_000.0]);
         check(&[], &[1.0]);
         check(&[f64::NAN, -1.0, 0.0, 1.0], &[1.0]);

@@ -2,11 +2,10 @@
 
 use super::Effort;
 use super::band::{Band, Output, WIDTH, solve, touch};
-use super::measure::median;
+use super::clock::{Spent, timed};
 use crate::photometry::Method;
 use crate::solve::method_name;
 use serde::Serialize;
-use std::time::Instant;
 
 const MEGAPIXELS: [f64; 5] = [1.0, 4.0, 16.0, 50.0, 100.0];
 const LIGHTS: [usize; 10] = [3, 4, 6, 10, 14, 16, 24, 32, 48, 64];
@@ -36,7 +35,9 @@ pub struct CurvePoint {
     pub lights: usize,
     /// Median time.
     pub milliseconds: f64,
-    /// The same over that of touching the bytes once.
+    /// Median processor time, all threads together.
+    pub processor_milliseconds: f64,
+    /// The latter over that of touching the bytes once.
     pub times_touch: f64,
 }
 
@@ -86,31 +87,29 @@ fn curves(over: &'static str, plans: impl Iterator<Item = Plan>) -> Vec<Curve> {
 fn measure_plan(plan: Plan) -> Vec<CurvePoint> {
     let band = Band::new(plan.lights, plan.band_rows, FAILING);
     let mut output = Output::new(plan.band_rows);
-    let mut seconds = vec![Vec::new(); 1 + METHODS.len()];
+    let mut spent = vec![Vec::new(); 1 + METHODS.len()];
     // One band without counting: everything in place.
     touch(&band, &mut output);
     for _ in 0..plan.rounds {
-        for (k, seconds) in seconds.iter_mut().enumerate() {
-            let begun = Instant::now();
-            for _ in 0..plan.bands {
-                match k.checked_sub(1) {
-                    None => touch(&band, &mut output),
-                    Some(method) => solve(&band, &mut output, METHODS[method]),
-                }
-            }
-            seconds.push(begun.elapsed().as_secs_f64());
+        for (k, spent) in spent.iter_mut().enumerate() {
+            let work = |_| match k.checked_sub(1) {
+                None => touch(&band, &mut output),
+                Some(method) => solve(&band, &mut output, METHODS[method]),
+            };
+            spent.push(timed(|| (0..plan.bands).for_each(work)).0);
         }
     }
-    let touched = median(&seconds[0]);
+    let touched = Spent::median(&spent[0]);
     let megapixels = (plan.bands * plan.band_rows * WIDTH) as f64 / 1e6;
-    let point = |seconds: &Vec<f64>| {
-        let median = median(seconds);
+    let point = |spent: &Vec<Spent>| {
+        let median = Spent::median(spent);
         CurvePoint {
             megapixels,
             lights: plan.lights,
-            milliseconds: 1e3 * median,
-            times_touch: median / touched,
+            milliseconds: 1e3 * median.wall_s,
+            processor_milliseconds: 1e3 * median.processor_s,
+            times_touch: median.processor_s / touched.processor_s,
         }
     };
-    seconds.iter().map(point).collect()
+    spent.iter().map(point).collect()
 }

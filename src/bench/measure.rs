@@ -1,22 +1,23 @@
 //! Times and errors of every contender on one set.
 
-use super::methods::{Answer, Contender, Pace};
+use super::clock::{Spent, timed};
+use super::methods::{Contender, Pace};
 use super::report::{MethodReport, SetReport, Touch};
 use super::sets::Set;
 use super::{BenchError, Effort, pareto_front};
 use crate::compare::{NormalFigures, Pair, compare_normals};
 use crate::photometry::Outcome;
 use crate::raw::{Frame, Samples};
-use crate::solve::{Rows, Scene, SolveError};
+use crate::solve::{Rows, Scene};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::hint::black_box;
 use std::ops::Range;
-use std::time::Instant;
 use weavelight_calibration::description::Image;
 
-/// A contender is not run again once it has taken this long.
-const BUDGET_S: f64 = 1.0;
+/// A contender is not run again once it has taken so long.
+const BUDGET_S: f64 = 2.0;
+const BUDGET_OF_SLOW_S: f64 = 0.5;
 /// Rows of a band when touching.
 const BAND_ROWS: usize = 64;
 
@@ -24,7 +25,7 @@ const BAND_ROWS: usize = 64;
 struct Runs {
     figures: Figures,
     robust_share: Option<f64>,
-    seconds: Vec<f64>,
+    spent: Vec<Spent>,
 }
 
 /// Errors, and how many photosites have none.
@@ -42,13 +43,15 @@ pub(super) fn of_set(
     let step = rows_step(set, effort);
     let (touches, runs) =
         Rows::with(&set.scene, |rows| take_turns(set, rows, contenders, step, effort))??;
-    let touch_s = median(&touches);
-    let points: Vec<[f64; 2]> =
-        runs.iter().map(|runs| [median(&runs.seconds), runs.figures.errors.mean_deg]).collect();
+    let touched = Spent::median(&touches);
+    let points: Vec<[f64; 2]> = runs
+        .iter()
+        .map(|runs| [Spent::median(&runs.spent).processor_s, runs.figures.errors.mean_deg])
+        .collect();
     let methods = contenders.iter().zip(&runs).zip(pareto_front(&points));
     let methods = methods.map(|((contender, runs), on_front)| MethodReport {
         on_front,
-        ..method_report(contender, runs, touch_s)
+        ..method_report(contender, runs, touched)
     });
     Ok(SetReport {
         name: set.name.clone(),
@@ -57,21 +60,26 @@ pub(super) fn of_set(
         lights: set.scene.lights.len(),
         rows_step: step,
         compared: compared(set, step).count(),
-        touch: Touch { bytes: touched_bytes(&set.scene), milliseconds: 1e3 * touch_s },
+        touch: Touch {
+            bytes: touched_bytes(&set.scene),
+            milliseconds: 1e3 * touched.wall_s,
+            processor_milliseconds: 1e3 * touched.processor_s,
+        },
         methods: methods.collect(),
         warnings: set.warnings.clone(),
     })
 }
 
-fn method_report(contender: &Contender, runs: &Runs, touch_s: f64) -> MethodReport {
+fn method_report(contender: &Contender, runs: &Runs, touched: Spent) -> MethodReport {
     let NormalFigures { mean_deg, median_deg, rms_deg, p95_deg, .. } = runs.figures.errors;
-    let seconds = median(&runs.seconds);
+    let spent = Spent::median(&runs.spent);
     MethodReport {
         name: contender.name.to_owned(),
         about: contender.about.to_owned(),
-        times_touch: seconds / touch_s,
-        milliseconds: 1e3 * seconds,
-        repeats: runs.seconds.len(),
+        times_touch: spent.processor_s / touched.processor_s,
+        milliseconds: 1e3 * spent.wall_s,
+        processor_milliseconds: 1e3 * spent.processor_s,
+        repeats: runs.spent.len(),
         mean_deg,
         median_deg,
         rms_deg,
@@ -101,50 +109,54 @@ fn compared(set: &Set, step: usize) -> impl Iterator<Item = usize> {
         .filter(|&place| is_known(&set.truth.data[place]))
 }
 
-/// Seconds of every touch, and the runs of every contender. The first round warms up, and is all that slow contenders get.
+/// What every touch took, and the runs of every contender. The first round warms up; it counts only for contenders that have
+/// no time for another.
 fn take_turns(
     set: &Set,
     rows: &Rows,
     contenders: &[Contender],
     step: usize,
     effort: Effort,
-) -> Result<(Vec<f64>, Vec<Runs>), BenchError> {
+) -> Result<(Vec<Spent>, Vec<Runs>), BenchError> {
+    let mut first = Vec::new();
     let mut runs = Vec::new();
     for contender in contenders {
-        let (seconds, answer) = timed(rows, contender, step)?;
+        let (spent, answer) = timed(|| (contender.solve)(rows, step));
+        let answer = answer?;
         let figures = figures(set, &answer.normal, step)
             .ok_or_else(|| BenchError::Nothing { set: set.name.clone() })?;
-        runs.push(Runs { figures, robust_share: answer.robust_share, seconds: vec![seconds] });
+        runs.push(Runs { figures, robust_share: answer.robust_share, spent: vec![] });
+        first.push(spent);
     }
-    let first: Vec<f64> = runs.iter_mut().map(|runs| runs.seconds.remove(0)).collect();
     let mut touches = Vec::new();
     for _ in 0..effort.rounds() {
-        touches.push(touch(&set.scene));
+        touches.push(timed(|| touch(&set.scene)).0);
         for ((contender, runs), first) in contenders.iter().zip(&mut runs).zip(&first) {
-            let spent = first + runs.seconds.iter().sum::<f64>();
-            if spent < BUDGET_S {
-                runs.seconds.push(timed(rows, contender, step)?.0);
+            let wall_s = first.wall_s + runs.spent.iter().map(|spent| spent.wall_s).sum::<f64>();
+            if wall_s < budget_s(contender.pace) {
+                let (spent, answer) = timed(|| (contender.solve)(rows, step));
+                answer?;
+                runs.spent.push(spent);
             }
         }
     }
-    for (runs, first) in runs.iter_mut().zip(first) {
-        if runs.seconds.is_empty() {
-            runs.seconds.push(first);
+    let share = set.scene.height as f64 / set.scene.height.div_ceil(step) as f64;
+    for ((contender, runs), first) in contenders.iter().zip(&mut runs).zip(first) {
+        if runs.spent.is_empty() {
+            runs.spent.push(first);
         }
-    }
-    for (contender, runs) in contenders.iter().zip(&mut runs) {
         if contender.pace == Pace::Rows {
-            let share = set.scene.height as f64 / set.scene.height.div_ceil(step) as f64;
-            runs.seconds.iter_mut().for_each(|seconds| *seconds *= share);
+            runs.spent.iter_mut().for_each(|spent| *spent = spent.times(share));
         }
     }
     Ok((touches, runs))
 }
 
-fn timed(rows: &Rows, contender: &Contender, step: usize) -> Result<(f64, Answer), SolveError> {
-    let begun = Instant::now();
-    let answer = (contender.solve)(rows, step)?;
-    Ok((begun.elapsed().as_secs_f64(), answer))
+fn budget_s(pace: Pace) -> f64 {
+    match pace {
+        Pace::Frames => BUDGET_S,
+        Pace::Rows => BUDGET_OF_SLOW_S,
+    }
 }
 
 /// Errors over the photosites of every `step`th row that have a truth; `None` where there is none.
@@ -170,13 +182,6 @@ fn across(normal: [f64; 3]) -> [f64; 3] {
     normal.cross(&Vector3::from_fn(|axis, _| if axis == least { 1.0 } else { 0.0 })).into()
 }
 
-/// The middle value, the mean of the middle two; NaN of nothing.
-pub(super) fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    crate::compare::percentile(&sorted, 0.5).unwrap_or(f64::NAN)
-}
-
 /// The maps that a solve returns, as plain memory.
 struct Touched {
     normal: Vec<[f32; 3]>,
@@ -186,7 +191,7 @@ struct Touched {
 }
 
 /// Bytes of every sample and of every map.
-pub(super) fn touched_bytes(scene: &Scene) -> usize {
+fn touched_bytes(scene: &Scene) -> usize {
     let of_frame = |frame: &Frame| match &frame.samples {
         Samples::U16(samples) => 2 * samples.len(),
         Samples::F32(samples) => 4 * samples.len(),
@@ -195,10 +200,8 @@ pub(super) fn touched_bytes(scene: &Scene) -> usize {
     scene.exposures().map(|e| of_frame(&e.frame)).sum::<usize>() + scene.width * scene.height * site
 }
 
-/// Seconds of reading every sample once and writing every byte of the maps once, on the same threads, into fresh memory
-/// like a solve.
-pub(super) fn touch(scene: &Scene) -> f64 {
-    let begun = Instant::now();
+/// Reads every sample once and writes every byte of the maps once, on the same threads, into fresh memory like a solve.
+fn touch(scene: &Scene) {
     let pixels = scene.width * scene.height;
     let mut out = Touched {
         normal: vec![[0.0; 3]; pixels],
@@ -219,7 +222,6 @@ pub(super) fn touch(scene: &Scene) -> f64 {
     });
     black_box(&out.normal);
     black_box((&out.albedo, &out.error, &out.outcome));
-    begun.elapsed().as_secs_f64()
 }
 
 /// Some value that depends on every sample of a span of pixels.

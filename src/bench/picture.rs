@@ -31,7 +31,7 @@ fn of_set(set: &SetReport) -> Panel {
     Panel {
         title: set.name.clone(),
         axes: [
-            "time, multiples of touching the bytes once".to_owned(),
+            "processor time, multiples of touching the bytes once".to_owned(),
             "mean error, degrees".to_owned(),
         ],
         marks: set.methods.iter().map(mark).collect(),
@@ -56,11 +56,11 @@ fn front(set: &SetReport) -> Vec<[f64; 2]> {
 fn of_curves(over: &str, curves: &[Curve]) -> Option<Panel> {
     let at = |point: &CurvePoint| {
         let across = if over == "lights" { point.lights as f64 } else { point.megapixels };
-        [across, point.milliseconds]
+        [across, point.processor_milliseconds]
     };
     let mut panel = Panel {
         title: format!("generated bands: time over {over}"),
-        axes: [over.to_owned(), "milliseconds".to_owned()],
+        axes: [over.to_owned(), "processor time, milliseconds".to_owned()],
         marks: vec![],
         lines: vec![],
     };

@@ -49,6 +49,8 @@ pub struct Touch {
     pub bytes: usize,
     /// Median time.
     pub milliseconds: f64,
+    /// Median processor time, all threads together.
+    pub processor_milliseconds: f64,
 }
 
 /// One method on one set.
@@ -58,10 +60,12 @@ pub struct MethodReport {
     pub name: String,
     /// What it does.
     pub about: String,
-    /// Median time over that of touching the bytes once.
+    /// Median processor time over that of touching the bytes once.
     pub times_touch: f64,
     /// Median time of a whole frame; of slow methods, extrapolated from the rows solved.
     pub milliseconds: f64,
+    /// Median processor time, all threads together.
+    pub processor_milliseconds: f64,
     /// Runs that the median is of.
     pub repeats: usize,
     /// Angle to the true normal, mean, degrees; unsolved photosites count 90.

@@ -59,12 +59,12 @@ pub fn curves_text(curves: &[Curve]) -> String {
             let photosites = 1e6 * point.megapixels;
             let _ = writeln!(
                 text,
-                "  {:>6.1} MP {:>3} lights {:>8.2} x touch {:>9.1} ms {:>7.2} ns a photosite",
+                "  {:>6.1} MP {:>3} lights {:>8.2} x touch {:>9.1} ms {:>7.2} ns of processor a photosite",
                 point.megapixels,
                 point.lights,
                 point.times_touch,
                 point.milliseconds,
-                1e6 * point.milliseconds / photosites,
+                1e6 * point.processor_milliseconds / photosites,
             );
         }
     }
@@ -82,6 +82,7 @@ mod tests {
             about: String::new(),
             times_touch: 4.56,
             milliseconds: 123.45,
+            processor_milliseconds: 200.0,
             repeats: 3,
             mean_deg: 1.234,
             median_deg: 0.5,
@@ -102,7 +103,7 @@ mod tests {
             lights: 10,
             rows_step: 1,
             compared: 5,
-            touch: Touch { bytes: 12_300_000, milliseconds: 1.5 },
+            touch: Touch { bytes: 12_300_000, milliseconds: 1.5, processor_milliseconds: 3.0 },
             methods: vec![method("auto", true, Some(0.25)), method("l1", false, None)],
             warnings: vec![],
         };
@@ -130,13 +131,14 @@ linen: plain weave
             megapixels: 2.0,
             lights: 10,
             milliseconds: 30.0,
+            processor_milliseconds: 50.0,
             times_touch: 3.0,
         };
         let curve = Curve { over: "lights", method: "auto", points: vec![point] };
         let text = curves_text(&[curve]);
         assert_eq!(
             text,
-            "auto over lights\n     2.0 MP  10 lights     3.00 x touch      30.0 ms   15.00 ns a photosite\n"
+            "auto over lights\n     2.0 MP  10 lights     3.00 x touch      30.0 ms   25.00 ns of processor a photosite\n"
         );
     }
 }

@@ -10,7 +10,8 @@ use std::path::PathBuf;
 /// Measure run time against error, for every method
 ///
 /// On simulated fabrics with and without shadows and highlights, and on picture sets of yours whose true normals are known.
-/// Writes bench.svg and bench.json. Times are multiples of reading every sample and writing every map once; `*` marks
+/// Writes bench.svg and bench.json. Times are multiples, in processor time, of reading every sample and
+/// writing every map once; `*` marks
 /// methods that no other beats in both time and error.
 #[derive(Debug, clap::Args)]
 #[command(

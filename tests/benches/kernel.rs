@@ -12,11 +12,11 @@
 )]
 
 use std::hint::black_box;
-use std::time::Instant;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use weavelight::bench::band::{Band, Buffers, Output, WIDTH, solve, touch, with_row};
+use weavelight::bench::timed;
 use weavelight::photometry::{Method, reference_row};
 
 /// Float64 normal equations photosite by photosite, on one row in `thin`.
@@ -61,25 +61,6 @@ fn median(mut seconds: Vec<f64>) -> f64 {
     seconds[seconds.len() / 2]
 }
 
-/// Processor time of all threads so far, seconds: what other programs take does not count. Wall time where the system does
-/// not tell.
-fn processor_seconds(since: Instant) -> f64 {
-    let of_thread = |task: std::fs::DirEntry| -> Option<f64> {
-        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
-        text.split_whitespace().next()?.parse().ok()
-    };
-    match std::fs::read_dir("/proc/self/task") {
-        Ok(tasks) => 1e-9 * tasks.flatten().filter_map(of_thread).sum::<f64>(),
-        Err(_) => since.elapsed().as_secs_f64(),
-    }
-}
-
-fn time(since: Instant, mut work: impl FnMut()) -> f64 {
-    let start = processor_seconds(since);
-    work();
-    processor_seconds(since) - start
-}
-
 type Work<'a> = Box<dyn FnMut(&mut Output) + 'a>;
 
 /// Times the works in turn and prints them as ratios to the first of the same band. The factor is what a thinned work must
@@ -87,11 +68,10 @@ type Work<'a> = Box<dyn FnMut(&mut Output) + 'a>;
 fn table(title: &str, repeats: usize, rows: usize, mut lines: Vec<(String, f64, Work)>) {
     println!("\n{title}");
     let mut output = Output::new(rows);
-    let since = Instant::now();
     let mut seconds = vec![Vec::new(); lines.len()];
     for _ in 0..repeats {
         for ((_, factor, work), seconds) in lines.iter_mut().zip(&mut seconds) {
-            seconds.push(*factor * time(since, || work(&mut output)));
+            seconds.push(*factor * timed(|| work(&mut output)).0.processor_s);
         }
     }
     let mut touched = f64::NAN;
