@@ -44,6 +44,7 @@ build: packages-all
 
 bench: packages-all
 	cargo bench --locked --all-features
+	cargo run --release --locked --quiet --all-features -- bench --out bench --curves
 
 # Fifteen minutes with the real firmware over a bad wire; make soak SOAK_S=60 for a short one.
 SOAK_S ?= 900
