@@ -1,6 +1,6 @@
 //! The figures of docs/calibration.md, over several seeds, each with its limit. They take minutes and run on request:
 //!
-//! `cargo test --release --features opencv --test calibration figures -- --ignored --nocapture --test-threads 1`
+//! `cargo test --features opencv --test calibration figures -- --ignored --nocapture --test-threads 1`
 
 use super::bench::{Bench, SIX_SHEETS, WHITE, lights_of};
 use nalgebra::{Matrix3, Point3, Vector3};
