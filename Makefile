@@ -10,6 +10,8 @@ SHELL := /bin/bash
 LINKER_PACKAGES := gcc libc6-dev
 # Chessboards are found by OpenCV; its bindings are generated with clang.
 OPENCV_PACKAGES := g++ pkg-config clang libclang-dev libopencv-dev
+# Tethered cameras are held by libgphoto2; its bindings are generated with clang.
+TETHER_PACKAGES := pkg-config clang libclang-dev libgphoto2-dev
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
@@ -19,7 +21,7 @@ packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
 
 packages-all:
-	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES)
+	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES) $(TETHER_PACKAGES)
 
 packages-firmware:
 	@bash .ci/packages $(LINKER_PACKAGES) $(FIRMWARE_PACKAGES)

@@ -5,10 +5,12 @@
 
 mod error;
 mod simulated;
+pub mod tethered;
 mod watched;
 
 pub use error::CameraError;
 pub use simulated::{Eyes, SimulatedCamera};
+pub use tethered::{Tether, TetheredCamera};
 pub use watched::{Waiting, WatchedCamera};
 
 use std::path::{Path, PathBuf};
