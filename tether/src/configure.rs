@@ -33,7 +33,7 @@ pub(crate) fn configure(camera: &Camera, setup: &Setup) -> Result<Configured, Fa
     for (name, wanted) in PLAIN {
         setter.set(name, wanted[0], |labels| choice::any_of(labels, wanted))?;
     }
-    setter.first_of(&QUALITY, "RAW", |labels| choice::raw(labels))?;
+    setter.first_of(&QUALITY, "RAW", choice::raw)?;
     setter.white_balance()?;
     let iso = setup.iso.to_string();
     setter.first_of(&["iso"], &iso, |labels| choice::iso(labels, setup.iso))?;

@@ -58,6 +58,25 @@ pub enum CameraError {
         /// How long was waited.
         after: Duration,
     },
+    /// It does something else at the moment.
+    #[error(
+        "the camera is busy with something else; leave its menus, its playback and live view, then try again"
+    )]
+    Busy,
+    /// It refused for a reason that has no name of its own here.
+    #[error("the camera refused ({reason}); switch it off and on, then try again")]
+    Refused {
+        /// As its driver says.
+        reason: String,
+    },
+    /// The program that holds a tethered camera cannot be used.
+    #[error("{}: {why}", .helper.display())]
+    Helper {
+        /// Its executable.
+        helper: PathBuf,
+        /// What is wrong and what to do.
+        why: String,
+    },
     /// Another program has the camera.
     #[error("another program is using the camera{}; close it (desktops: eject the camera in the file manager), then try again", named(.by.as_deref()))]
     Claimed {
@@ -157,6 +176,8 @@ impl CameraError {
             | Self::NoPicture { .. }
             | Self::LinkLost { .. }
             | Self::NeverReady { .. }
+            | Self::Busy
+            | Self::Refused { .. }
             | Self::NothingArrived { .. }
             | Self::TooEarly { .. }
             | Self::SeveralArrived { .. }

@@ -53,7 +53,7 @@ fn the_link_is_cut_during_the_transfer() {
 
 #[test]
 fn an_error_instead_of_the_picture() {
-    check(Fault::DownloadError, |error| matches!(error, CameraError::Other { .. }));
+    check(Fault::DownloadError, |error| matches!(error, CameraError::Refused { .. }));
 }
 
 #[test]

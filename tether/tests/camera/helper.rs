@@ -81,7 +81,7 @@ fn a_missing_or_foreign_helper_is_named() {
     let check = |helper: &str, expected: &str| {
         let tether = Tether { helper: helper.into(), ..bench.tether() };
         let error = TetheredCamera::open(tether).unwrap_err();
-        assert!(matches!(error, CameraError::Other { .. }), "{error}");
+        assert!(matches!(error, CameraError::Helper { .. }), "{error}");
         assert!(error.to_string().contains(expected), "{error}");
         assert!(error.to_string().contains("make build"), "{error}");
     };

@@ -64,16 +64,12 @@ fn of_fault(fault: Fault, picture_within: Duration) -> CameraError {
         Fault::NoPicture => CameraError::NoPicture { after: picture_within },
         Fault::NotRaw { name } => CameraError::NotRaw { found: kind_of(&name) },
         Fault::LinkCut => CameraError::LinkLost { reason: "in the middle of a call".to_owned() },
-        Fault::Busy => other(
-            "the camera is busy with something else; leave its menus, its playback and live view, then try again".to_owned(),
-        ),
+        Fault::Busy => CameraError::Busy,
         Fault::File { path, reason } => {
             let source = io::Error::other(reason);
             CameraError::File(FileError::Write { path: PathBuf::from(path), source })
         }
-        Fault::Other { reason } => other(format!(
-            "the camera refused ({reason}); switch it off and on, then try again"
-        )),
+        Fault::Other { reason } => CameraError::Refused { reason },
     }
 }
 

@@ -51,36 +51,28 @@ impl Tether {
 
     /// Starts the helper and sees that it speaks this program's protocol.
     fn start(&self) -> Result<Helper, CameraError> {
+        let unusable =
+            |why: &str| CameraError::Helper { helper: self.helper.clone(), why: why.to_owned() };
         if !self.helper.is_file() {
-            return Err(CameraError::Other { what: self.helper_missing() });
+            return Err(unusable(HELPER_MISSING));
         }
         std::fs::create_dir_all(&self.home)
             .map_err(|source| FileError::Write { path: self.home.clone(), source })?;
-        let mut helper = Helper::start(&self.helper, &self.home).map_err(|error| {
-            CameraError::Other { what: self.helper_unusable(&error.to_string()) }
-        })?;
+        let mut helper = Helper::start(&self.helper, &self.home)
+            .map_err(|error| unusable(&format!("{error}; build it again with `make build`")))?;
         match helper.call(Request::Hello, self.patience, &mut |_| {}) {
             Ok(Answer::Hello(versions)) if versions.protocol == PROTOCOL => Ok(helper),
-            Ok(_) => Err(CameraError::Other {
-                what: self.helper_unusable("it is of another version than this program"),
-            }),
-            Err(_) => Err(CameraError::Other {
-                what: self.helper_unusable("it does not answer; is libgphoto2 installed?"),
-            }),
+            Ok(_) => Err(unusable(
+                "it is of another version than this program; build both with `make build`",
+            )),
+            Err(_) => Err(unusable(
+                "it does not answer; install libgphoto2, and build it again with `make build`",
+            )),
         }
     }
-
-    fn helper_missing(&self) -> String {
-        format!(
-            "{}: tethered cameras need this program, which is not there; build it with `make build` (package libgphoto2-dev), or let another program save into a folder: kind = \"watched\" in rig.toml",
-            self.helper.display()
-        )
-    }
-
-    fn helper_unusable(&self, reason: &str) -> String {
-        format!("{}: {reason}; build it again with `make build`", self.helper.display())
-    }
 }
+
+const HELPER_MISSING: &str = "tethered cameras need this program, which is not there; build it with `make build` (package libgphoto2-dev), or let another program save into a folder: kind = \"watched\" in rig.toml";
 
 fn beside_this_program() -> PathBuf {
     let name = format!("{HELPER}{}", std::env::consts::EXE_SUFFIX);
