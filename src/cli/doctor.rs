@@ -2,8 +2,10 @@
 
 use super::output::{Failure, Output};
 use crate::device::board::PortChoice;
+use crate::device::scan::{CameraFinding, diagnose_camera};
 use crate::doctor::{Examination, LightBoard, SerialPort, examine, examine_boards};
 use crate::instrument::Rig;
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Say what of the machine and the instrument is there and usable
@@ -13,7 +15,7 @@ pub(super) struct Args {
     /// Folder that outputs would go to
     #[arg(long, value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Look for the light board that this rig describes, instead of any
+    /// Look for the light board and the camera that this rig describes, instead of any
     #[arg(long, value_name = "FILE")]
     rig: Option<PathBuf>,
 }
@@ -25,10 +27,13 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let boards = examine_boards(&choice, rig.as_ref().map(|rig| rig.lights.len()));
     let mut json = serde_json::to_value(&examination).map_err(Failure::work)?;
     json["light_boards"] = serde_json::to_value(&boards).map_err(Failure::work)?;
-    Ok(Output { text: text(&examination, &boards), json, ..Output::default() })
+    let cameras = diagnose_camera(rig.as_ref().zip(args.rig.as_deref()));
+    let camera = |camera: &CameraFinding| json!({ "name": camera.what, "problem": camera.problem });
+    json["cameras"] = cameras.iter().map(camera).collect();
+    Ok(Output { text: text(&examination, &boards, &cameras), json, ..Output::default() })
 }
 
-fn text(found: &Examination, boards: &[LightBoard]) -> String {
+fn text(found: &Examination, boards: &[LightBoard], cameras: &[CameraFinding]) -> String {
     let mut lines = vec![
         format!("program    {}", found.program),
         format!("boards     {}", chessboards(found)),
@@ -43,7 +48,10 @@ fn text(found: &Examination, boards: &[LightBoard]) -> String {
     }
     lines.extend(found.serial_ports.iter().map(|port| format!("serial     {}", serial(port))));
     lines.extend(boards.iter().map(|board| format!("lights     {}", light_board(board))));
-    lines.push("camera     tethered cameras are not part of this version; copy frames into a capture session".to_owned());
+    lines.extend(cameras.iter().map(|camera| {
+        let problem = camera.problem.as_deref().unwrap_or("is there");
+        format!("camera     {}: {problem}", camera.what)
+    }));
     lines.join("\n")
 }
 

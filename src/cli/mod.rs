@@ -11,6 +11,7 @@ mod gui;
 mod import;
 mod output;
 mod progress;
+mod scan;
 mod simulate;
 mod solve;
 #[cfg(test)]
@@ -35,6 +36,7 @@ struct Cli {
 enum Command {
     Demo(demo::Args),
     Simulate(Box<simulate::Args>),
+    Scan(scan::Args),
     Solve(solve::Args),
     Import(import::Args),
     Calibrate(calibrate::Args),
@@ -49,6 +51,7 @@ impl Command {
         match self {
             Command::Demo(args) => demo::run(args),
             Command::Simulate(args) => simulate::run(args),
+            Command::Scan(args) => scan::run(args),
             Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
             Command::Calibrate(args) => calibrate::run(args),

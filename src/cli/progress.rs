@@ -27,6 +27,13 @@ impl Progress {
     }
 }
 
+impl Progress {
+    /// A line that stays, over the bar; on a terminal only.
+    pub(super) fn say(&self, line: &str) {
+        self.0.println(line);
+    }
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         self.0.finish_and_clear();

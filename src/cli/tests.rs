@@ -69,6 +69,16 @@ fn calls_are_understood_or_refused() {
     check("weavelight simulate --out d --preset felt", false);
     check("weavelight simulate --out d --only everything", false);
     check("weavelight simulate --preset knit", false);
+    check(
+        "weavelight scan --rig r.toml --out s --name N --thickness-mm 1 --exposure-s 0.5 --resume",
+        true,
+    );
+    check("weavelight scan --rig r.toml --dry-run --bracket 0.25,4", true);
+    check("weavelight scan --rig r.toml --preview --light 3", true);
+    check("weavelight scan --rig r.toml", false);
+    check("weavelight scan --out s", false);
+    check("weavelight scan --rig r.toml --out s --thickness-mm -1", false);
+    check("weavelight scan --rig r.toml --out s --light 3", false);
     check("weavelight doctor", true);
     check("weavelight gui", true);
     check("weavelight fly", false);

@@ -84,7 +84,7 @@ pub fn examine(folder: &Path) -> Examination {
             .and_then(available_memory_mb),
         folder: folder.to_owned(),
         write_error: tempfile::tempfile_in(folder).err().map(|error| error.to_string()),
-        free_space_mb: free_space_mb(folder),
+        free_space_mb: crate::files::free_bytes(folder).map(|bytes| bytes >> 20),
         serial_ports: serial_ports(Path::new("/dev")),
     }
 }
@@ -94,17 +94,6 @@ fn available_memory_mb(meminfo: &str) -> Option<u64> {
     let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib / 1024)
-}
-
-#[cfg(unix)]
-fn free_space_mb(folder: &Path) -> Option<u64> {
-    let disk = rustix::fs::statvfs(folder).ok()?;
-    Some(disk.f_bavail.saturating_mul(disk.f_frsize) >> 20)
-}
-
-#[cfg(not(unix))]
-fn free_space_mb(_folder: &Path) -> Option<u64> {
-    None
 }
 
 /// USB serial ports, as Linux and macOS name them, in order.

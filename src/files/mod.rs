@@ -2,6 +2,7 @@
 //! appear under their final names only when whole.
 
 mod atomic;
+mod disk;
 mod document;
 mod error;
 mod hash;
@@ -11,6 +12,7 @@ mod staged;
 mod write_toml;
 
 pub use atomic::write_atomic;
+pub use disk::free_bytes;
 pub use document::Document;
 pub use error::FileError;
 pub use hash::{sha256_hex, sha256_of_file};

@@ -51,6 +51,16 @@ pub fn decode(bytes: &[u8], hint: &Hint) -> Result<Frame, DecodeError> {
     }
 }
 
+/// What a frame's file says of the camera, without decoding the picture; empty where it says nothing.
+pub fn metadata(bytes: &[u8]) -> Metadata {
+    match Format::sniff(bytes) {
+        Some(Format::Png | Format::Jpeg) => metadata::from_exif_container(bytes),
+        Some(Format::Exr) => Metadata::default(),
+        _ => Tiff::parse(bytes)
+            .map_or_else(|_| Metadata::default(), |tiff| metadata::from_tiff(&tiff)),
+    }
+}
+
 /// The whole sensor, masked borders included: width, height and samples row by row, as libraw's `raw_image`.
 ///
 /// # Errors

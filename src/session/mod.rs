@@ -109,6 +109,8 @@ pub struct FrameEntry {
     pub captured: Option<jiff::Timestamp>,
     /// How often it was tried.
     pub attempts: Option<u32>,
+    /// Why it was tried again, each time.
+    pub retries: Vec<String>,
     /// Pins as read back when the shutter opened.
     pub pins_open: Option<u32>,
     /// Pins as read back when it closed.
@@ -142,6 +144,7 @@ impl FrameEntry {
             pose: None,
             captured: None,
             attempts: None,
+            retries: Vec::new(),
             pins_open: None,
             pins_close: None,
             board_ms: None,

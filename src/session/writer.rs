@@ -1,5 +1,6 @@
 use super::{FrameEntry, MANIFEST, Session, SessionError};
 use crate::files::{FileError, sha256_hex, write_atomic};
+use std::fs::File;
 use std::path::Path;
 
 /// A capture session that grows frame by frame. After every call the folder is a valid capture session: a crash loses at
@@ -52,6 +53,51 @@ impl SessionWriter {
         write_atomic(&path, bytes)?;
         grown.save()?;
         self.session = grown;
+        Ok(())
+    }
+
+    /// Takes over a frame's file, which is on the capture session's disk and holds `bytes`: flushed to the disk, renamed, then
+    /// recorded with its hash. The frame in the file `replaced` leaves the record in the same moment, and its file after that.
+    ///
+    /// # Errors
+    /// Where file or manifest cannot be written, or the entry is impossible; the manifest is then as it was.
+    pub fn adopt(
+        &mut self,
+        mut entry: FrameEntry,
+        source: &Path,
+        bytes: &[u8],
+        replaced: Option<&Path>,
+    ) -> Result<(), SessionError> {
+        let flush = || File::open(source).and_then(|file| file.sync_all());
+        let (flushed, hash) = rayon::join(flush, || sha256_hex(bytes));
+        flushed.map_err(|error| FileError::write(source, error))?;
+        entry.sha256 = Some(hash);
+        let mut grown = self.session.clone();
+        grown.frames.retain(|frame| frame.file != entry.file && Some(&*frame.file) != replaced);
+        let path = grown.frame_path(&entry);
+        grown.frames.push(entry);
+        grown.check()?;
+        // Saving the manifest flushes the folder, and so this.
+        std::fs::rename(source, &path).map_err(|error| FileError::write(&path, error))?;
+        grown.save()?;
+        self.session = grown;
+        if let Some(replaced) = replaced {
+            // Nobody asks for it any more; what cannot be removed is only litter.
+            let _ = std::fs::remove_file(self.session.folder.join(replaced));
+        }
+        Ok(())
+    }
+
+    /// Takes the frame in `file` out of the record, and then its file away.
+    ///
+    /// # Errors
+    /// Where the manifest cannot be written; it is then as it was.
+    pub fn remove(&mut self, file: &Path) -> Result<(), SessionError> {
+        let mut rest = self.session.clone();
+        rest.frames.retain(|frame| frame.file != file);
+        rest.save()?;
+        self.session = rest;
+        let _ = std::fs::remove_file(self.session.folder.join(file));
         Ok(())
     }
 }

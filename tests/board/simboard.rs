@@ -74,6 +74,11 @@ impl SimBoard {
         self.folder.path().join("port")
     }
 
+    /// Its control socket: several may use it at once.
+    pub(crate) fn socket(&self) -> PathBuf {
+        self.folder.path().join("control")
+    }
+
     /// Sends one command and returns the first line of the reply.
     pub(crate) fn command(&mut self, command: &str) -> String {
         writeln!(self.control.get_mut(), "{command}").unwrap();

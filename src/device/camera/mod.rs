@@ -6,11 +6,13 @@
 mod error;
 mod simulated;
 pub mod tethered;
+mod usb;
 mod watched;
 
-pub use error::CameraError;
+pub use error::{CameraError, Cure};
 pub use simulated::{Eyes, SimulatedCamera};
 pub use tethered::{Tether, TetheredCamera};
+pub use usb::{UsbCamera, usb_cameras};
 pub use watched::{Waiting, WatchedCamera};
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,259 @@
+//! `weavelight scan`
+
+use super::output::{Failure, Output};
+use super::progress::Progress;
+use crate::device::camera::Settings;
+use crate::device::scan::{
+    About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Summary, open,
+    preview, scan,
+};
+use crate::instrument::Rig;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Photograph a swatch under one light after the other
+///
+/// Takes a frame with every LED off, one under each light, and the first again. Every frame is safe on disk before the next
+/// light; a scan that was stopped or killed goes on with --resume.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  weavelight scan --rig rig.toml --out linen-4021 --thickness-mm 0.8\n  weavelight scan --rig rig.toml --preview"
+)]
+pub(super) struct Args {
+    /// The rig
+    #[arg(long, value_name = "FILE")]
+    rig: PathBuf,
+    /// Folder of the capture session to write
+    #[arg(long, value_name = "SESSION", required_unless_present_any = ["preview", "dry_run"])]
+    out: Option<PathBuf>,
+    /// Name of the swatch [default: the folder's]
+    #[arg(long, value_name = "N")]
+    name: Option<String>,
+    /// How thick the swatch is: its surface lies this far over the table
+    #[arg(long, value_name = "T", value_parser = thickness)]
+    thickness_mm: Option<f64>,
+    /// Exposure time, the same for every light [default: found with test shots under light 0]
+    #[arg(long, value_name = "S")]
+    exposure_s: Option<f64>,
+    /// Sensitivity
+    #[arg(long, value_name = "N", default_value_t = 100.0)]
+    iso: f64,
+    /// Further exposures of each light, relative to the first, comma-separated: for cloth with highlights
+    #[arg(long, value_name = "X,...", value_delimiter = ',')]
+    bracket: Vec<f64>,
+    /// Go on where an earlier scan ended
+    #[arg(long)]
+    resume: bool,
+    /// Print what would be photographed, and touch nothing
+    #[arg(long)]
+    dry_run: bool,
+    /// Take one test shot, tell exposure and focus, and write nothing
+    #[arg(long, conflicts_with_all = ["resume", "dry_run", "bracket"])]
+    preview: bool,
+    /// The light of the test shot
+    #[arg(long, value_name = "K", default_value_t = 0, requires = "preview")]
+    light: usize,
+}
+
+fn thickness(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
+        _ => Err("write millimetres from 0 to 100".to_owned()),
+    }
+}
+
+/// Exposure of a test shot where none is given, seconds.
+const PREVIEW_S: f64 = 0.1;
+
+pub(super) fn run(args: &Args) -> Result<Output, Failure> {
+    let rig = Rig::load(&args.rig).map_err(Failure::work)?;
+    let plan = Plan::new(&rig, &args.bracket).map_err(failure)?;
+    match &args.out {
+        _ if args.dry_run => Ok(describe_plan(&plan, args)),
+        _ if args.preview => look(args, &rig, &plan),
+        Some(out) => photograph(args, &rig, out.clone()),
+        None => Err(Failure::call("--out is missing; name a folder, as in --out linen-4021")),
+    }
+}
+
+/// Some errors are about the call.
+fn failure(error: ScanError) -> Failure {
+    match error {
+        ScanError::Bracket { .. } | ScanError::BracketByHand | ScanError::Option { .. } => {
+            Failure::call(error)
+        }
+        _ => Failure::work(error),
+    }
+}
+
+fn photograph(args: &Args, rig: &Rig, folder: PathBuf) -> Result<Output, Failure> {
+    let Instruments { board, mut camera } = open(rig, &args.rig).map_err(failure)?;
+    let options = Options {
+        folder,
+        about: About { name: args.name.clone(), thickness_mm: args.thickness_mm },
+        begin: if args.resume { Begin::Resume } else { Begin::Anew },
+        exposure_s: args.exposure_s,
+        iso: args.iso,
+        bracket: args.bracket.clone(),
+    };
+    let progress = Progress::new();
+    let tell = |event: &Event| show(&progress, event);
+    let summary = scan(rig, &options, &board, camera.as_mut(), &Control::default(), &tell)
+        .map_err(failure)?;
+    drop(progress);
+    let retried =
+        summary.retries.iter().map(|(frame, why)| format!("{frame} was taken again: {why}"));
+    let warnings = retried.chain(summary.warnings.iter().cloned()).collect();
+    Ok(Output { text: text(&summary), json: of_summary(&summary), warnings, status: 0 })
+}
+
+fn show(progress: &Progress, event: &Event) {
+    match event {
+        Event::Metering => progress.set(0.0, "finding the exposure"),
+        Event::Frame { frame, done, total, left } => {
+            let left = left.map(|left| format!(", {:.0} s left", left.as_secs_f64()));
+            let what = format!("{frame}{}", left.unwrap_or_default());
+            progress.set(*done as f64 / (*total).max(1) as f64, &what);
+        }
+        Event::Again { frame, why } => progress.say(&format!("{frame}: {why}")),
+        Event::BoardLost => progress.say("the light board is gone; plug it in again"),
+        Event::Paused => progress.say("paused"),
+    }
+}
+
+fn text(summary: &Summary) -> String {
+    let seconds = summary.seconds;
+    let before = match summary.resumed {
+        0 => String::new(),
+        count => format!(" ({count} of them from before)"),
+    };
+    let exposure = summary
+        .settings
+        .map(|s| format!(" at {} s, ISO {}", s.exposure_s, s.iso))
+        .unwrap_or_default();
+    format!(
+        "{}: {} frames{before}{exposure} in {:.1} s ({:.1} s exposing, {:.1} s transfer)",
+        summary.folder.display(),
+        summary.frames,
+        seconds.total,
+        seconds.exposing,
+        seconds.transfer
+    )
+}
+
+fn of_summary(summary: &Summary) -> Value {
+    let seconds = summary.seconds;
+    let retries: Vec<Value> =
+        summary.retries.iter().map(|(frame, why)| json!({ "frame": frame, "why": why })).collect();
+    json!({
+        "session": summary.folder,
+        "frames": summary.frames,
+        "resumed": summary.resumed,
+        "exposure_s": summary.settings.map(|s| s.exposure_s),
+        "iso": summary.settings.map(|s| s.iso),
+        "retries": retries,
+        "warnings": summary.warnings,
+        "seconds": {
+            "total": seconds.total,
+            "exposing": seconds.exposing,
+            "transfer": seconds.transfer,
+            "lights": seconds.lights,
+            "disk": seconds.disk,
+        },
+    })
+}
+
+fn describe_plan(plan: &Plan, args: &Args) -> Output {
+    let exposure = |factor: f64| args.exposure_s.map(|s| s * factor);
+    let line = |(k, step): (usize, &crate::device::scan::Step)| {
+        let output = step.output.map_or("all off".to_owned(), |output| format!("output {output}"));
+        let exposure = exposure(step.factor).map_or_else(
+            || format!("{} x the exposure to be found", step.factor),
+            |s| format!("{s} s"),
+        );
+        format!("{:3}  {:24} {output:10} {exposure}", k + 1, step.stem)
+    };
+    let lines: Vec<String> = plan.steps.iter().enumerate().map(line).collect();
+    let json: Vec<Value> = plan
+        .steps
+        .iter()
+        .map(|step| {
+            json!({
+                "file": step.stem,
+                "light": step.light,
+                "output": step.output,
+                "exposure_s": exposure(step.factor),
+                "factor": step.factor,
+                "drift_check": step.drift_check,
+            })
+        })
+        .collect();
+    Output { text: lines.join("\n"), json: json!({ "frames": json }), ..Output::default() }
+}
+
+fn look(args: &Args, rig: &Rig, plan: &Plan) -> Result<Output, Failure> {
+    let light = args.light;
+    let step = plan.steps.iter().find(|step| step.light == Some(light));
+    let output = step.and_then(|step| step.output).ok_or_else(|| {
+        let last = rig.lights.len() - 1;
+        Failure::call(format!("--light is {light}; the rig has lights 0 to {last}"))
+    })?;
+    let Instruments { board, mut camera } = open(rig, &args.rig).map_err(failure)?;
+    let wanted = Settings { exposure_s: args.exposure_s.unwrap_or(PREVIEW_S), iso: args.iso };
+    let seen = preview(&board, camera.as_mut(), (light, output), wanted).map_err(failure)?;
+    Ok(Output { text: of_preview(&seen), json: preview_json(&seen), ..Output::default() })
+}
+
+/// A histogram as a row of bars.
+fn bars(histogram: &[f64]) -> String {
+    const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let pairs: Vec<f64> = histogram.chunks(2).map(|pair| pair.iter().sum()).collect();
+    let most = pairs.iter().copied().fold(1e-9, f64::max);
+    // Roots, so that a few bright samples are seen beside many dark ones.
+    pairs.iter().map(|share| BARS[((share / most).sqrt() * 8.0).ceil() as usize % 9]).collect()
+}
+
+fn of_preview(seen: &Preview) -> String {
+    let mut lines = vec![format!("light {}: {}", seen.light, seen.advice)];
+    lines.extend(seen.look.channels.iter().map(|channel| {
+        format!(
+            "{:4} |{}| mean {:4.1} %, brightest {:4.1} %, clipped {:.2} %",
+            channel.name,
+            bars(&channel.histogram),
+            100.0 * channel.mean,
+            100.0 * channel.high,
+            100.0 * channel.clipped
+        )
+    }));
+    lines.push(format!(
+        "focus {:.4}: larger is sharper; turn the focus ring and look again",
+        seen.look.sharpness
+    ));
+    lines.join("\n")
+}
+
+fn preview_json(seen: &Preview) -> Value {
+    let channels: Vec<Value> = seen
+        .look
+        .channels
+        .iter()
+        .map(|c| {
+            json!({
+                "name": c.name,
+                "mean": c.mean,
+                "high": c.high,
+                "clipped": c.clipped,
+                "histogram": c.histogram,
+            })
+        })
+        .collect();
+    json!({
+        "light": seen.light,
+        "exposure_s": seen.settings.exposure_s,
+        "iso": seen.settings.iso,
+        "better_exposure_s": seen.better_exposure_s,
+        "advice": seen.advice,
+        "focus": seen.look.sharpness,
+        "channels": channels,
+    })
+}

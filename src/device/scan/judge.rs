@@ -1,0 +1,70 @@
+//! Looks at frames while the next one is being taken.
+
+use super::look::Look;
+use crate::raw::{Hint, decode};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::time::Duration;
+
+/// What a frame turned out to be.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Seen {
+    Look(Look),
+    /// It is no usable picture; a sentence.
+    Damaged(String),
+    /// It is not as large as the rig says.
+    Size {
+        found: String,
+        expected: String,
+    },
+}
+
+/// A thread that decodes; it ends with this value.
+#[derive(Debug)]
+pub(super) struct Judge {
+    work: Sender<(usize, PathBuf)>,
+    results: Receiver<(usize, Seen)>,
+}
+
+impl Judge {
+    /// For frames of this size.
+    pub(super) fn start(size_px: [usize; 2]) -> Self {
+        let (work, inbox) = mpsc::channel::<(usize, PathBuf)>();
+        let (outbox, results) = mpsc::channel();
+        std::thread::spawn(move || {
+            for (step, path) in inbox {
+                if outbox.send((step, judge(&path, size_px))).is_err() {
+                    return;
+                }
+            }
+        });
+        Self { work, results }
+    }
+
+    /// Looks at a frame's file.
+    pub(super) fn look_at(&self, step: usize, path: Option<PathBuf>) {
+        if let Some(path) = path {
+            let _ = self.work.send((step, path));
+        }
+    }
+
+    /// The next frame that has been looked at, if there is one within `wait`.
+    pub(super) fn next(&self, wait: Duration) -> Option<(usize, Seen)> {
+        self.results.recv_timeout(wait).ok()
+    }
+}
+
+fn judge(path: &Path, size_px: [usize; 2]) -> Seen {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return Seen::Damaged(format!("{}: {error}", path.display())),
+    };
+    match decode(&bytes, &Hint::default()) {
+        Err(error) => Seen::Damaged(error.to_string()),
+        Ok(frame) if [frame.width, frame.height] != size_px => Seen::Size {
+            found: format!("{} x {}", frame.width, frame.height),
+            expected: format!("{} x {}", size_px[0], size_px[1]),
+        },
+        Ok(frame) => Seen::Look(Look::at(&frame)),
+    }
+}

@@ -1,0 +1,340 @@
+//! The capture session that a scan writes: begun or continued, and each frame safe before the next light.
+
+use super::ScanError;
+use super::plan::{Plan, Step};
+use crate::device::camera::Settings;
+use crate::files::{FileError, free_bytes};
+use crate::session::{FrameEntry, Kind, MANIFEST, Session, SessionError, SessionWriter};
+use nalgebra::{Point3, Vector3};
+use std::fs;
+use std::path::{Path, PathBuf};
+use weavelight_calibration::description::Plane;
+
+/// Where the camera saves, inside the capture session's folder; gone when the scan is over.
+const INCOMING: &str = ".incoming";
+/// Bytes of a frame beyond two for each photosite: previews, metadata.
+const FRAME_EXTRA: u64 = 2 << 20;
+
+/// What the capture session will say, beyond its frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct About {
+    /// Its name; the folder's where absent.
+    pub name: Option<String>,
+    /// How thick the swatch is: its plane lies this far over the table.
+    pub thickness_mm: Option<f64>,
+}
+
+/// Whether a capture session may be there already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begin {
+    /// No.
+    Anew,
+    /// It is continued, or begun where there is none.
+    Resume,
+}
+
+/// The capture session on disk.
+#[derive(Debug)]
+pub(super) struct Store {
+    writer: SessionWriter,
+    incoming: PathBuf,
+    /// Per step: the file that is recorded for it.
+    files: Vec<Option<PathBuf>>,
+}
+
+/// A frame to be stored.
+pub(super) struct Taken<'a> {
+    pub(super) step: usize,
+    /// Its file in the incoming folder, and what is in it.
+    pub(super) path: &'a Path,
+    pub(super) bytes: &'a [u8],
+    /// What the manifest will say but for file name, hash and drift check.
+    pub(super) entry: FrameEntry,
+}
+
+/// What was found of an earlier part of the scan.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    /// Steps whose frames are there, with their content.
+    pub(super) finished: Vec<usize>,
+    /// Exposure and sensitivity of the frames at the scan's own exposure.
+    pub(super) settings: Option<Settings>,
+    /// Sentences about frames that are not as they were recorded.
+    pub(super) warnings: Vec<String>,
+}
+
+impl Store {
+    /// Begins or continues the capture session in `folder`.
+    pub(super) fn open(
+        folder: &Path,
+        about: &About,
+        begin: Begin,
+        plan: &Plan,
+    ) -> Result<(Self, Found), ScanError> {
+        let there = folder.join(MANIFEST).exists().then(|| Session::load(folder)).transpose()?;
+        let writer = match (there, begin) {
+            (Some(session), Begin::Anew) => {
+                let (name, frames) = (session.name, session.frames.len());
+                return Err(ScanError::Taken { folder: folder.to_owned(), name, frames });
+            }
+            (Some(session), Begin::Resume) => {
+                check_same(&session, about, plan)?;
+                SessionWriter::resume(folder)?
+            }
+            (None, _) => SessionWriter::create(new_session(folder, about))?,
+        };
+        let incoming = folder.join(INCOMING);
+        let failed = |source| FileError::write(&incoming, source);
+        // What a killed scan left there is no finished frame.
+        if incoming.exists() {
+            fs::remove_dir_all(&incoming).map_err(failed)?;
+        }
+        fs::create_dir(&incoming).map_err(failed)?;
+        let mut store = Self { writer, files: vec![None; plan.steps.len()], incoming };
+        let found = store.find(plan)?;
+        Ok((store, found))
+    }
+
+    /// Which steps have their frame already; what is recorded but missing or altered leaves the record.
+    fn find(&mut self, plan: &Plan) -> Result<Found, ScanError> {
+        let mut found = Found::default();
+        for (k, step) in plan.steps.iter().enumerate() {
+            let session = self.writer.session();
+            let Some(entry) = session.frames.iter().find(|entry| is_of(entry, step)).cloned()
+            else {
+                continue;
+            };
+            match session.read_frame(&entry) {
+                Ok(_) => {
+                    self.files[k] = Some(entry.file);
+                    found.finished.push(k);
+                    if step.factor == 1.0 {
+                        let (exposure_s, iso) = (entry.exposure_s, entry.iso);
+                        found.settings = Some(Settings { exposure_s, iso });
+                    }
+                }
+                Err(
+                    error @ (SessionError::FrameMissing { .. } | SessionError::FrameAltered { .. }),
+                ) => {
+                    found.warnings.push(format!("{error}. It is taken again."));
+                    self.writer.remove(&entry.file)?;
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(found)
+    }
+
+    /// Where the camera saves.
+    pub(super) fn incoming(&self) -> &Path {
+        &self.incoming
+    }
+
+    /// The capture session so far.
+    pub(super) fn session(&self) -> &Session {
+        self.writer.session()
+    }
+
+    /// The file that is recorded for a step.
+    pub(super) fn file(&self, step: usize) -> Option<PathBuf> {
+        self.files[step].as_ref().map(|file| self.session().folder.join(file))
+    }
+
+    /// Makes a frame safe: on disk, hashed, recorded. An earlier frame of the step stays until the new one is.
+    pub(super) fn keep(&mut self, plan: &Plan, taken: Taken<'_>) -> Result<(), ScanError> {
+        let step = &plan.steps[taken.step];
+        let old = self.files[taken.step].clone();
+        let ending = taken.path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let name = |tag: &str| PathBuf::from(format!("{}{tag}.{ending}", step.stem));
+        let names = std::iter::once(name("")).chain((2..).map(|k| name(&format!("-take-{k}"))));
+        let file = names.into_iter().find(|name| old.as_ref() != Some(name)).unwrap_or(name(""));
+        let entry = FrameEntry { file: file.clone(), drift_check: step.drift_check, ..taken.entry };
+        self.writer.adopt(entry, taken.path, taken.bytes, old.as_deref())?;
+        self.files[taken.step] = Some(file);
+        Ok(())
+    }
+
+    /// Takes a step's frame out of the record.
+    pub(super) fn drop_frame(&mut self, step: usize) -> Result<(), ScanError> {
+        if let Some(file) = self.files[step].take() {
+            self.writer.remove(&file)?;
+        }
+        Ok(())
+    }
+
+    /// Empties the incoming folder: what is in there was not kept.
+    pub(super) fn clear_incoming(&self) {
+        for entry in fs::read_dir(&self.incoming).into_iter().flatten().flatten() {
+            // What cannot be removed is only litter.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+impl Drop for Store {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.incoming);
+    }
+}
+
+fn new_session(folder: &Path, about: &About) -> Session {
+    let named = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = about.name.clone().or_else(named).unwrap_or_else(|| "unnamed".to_owned());
+    Session {
+        captured: Some(jiff::Timestamp::now()),
+        plane: about.thickness_mm.map(level_plane),
+        ..Session::new(folder, Kind::Swatch, name)
+    }
+}
+
+fn level_plane(thickness_mm: f64) -> Plane {
+    Plane { point_mm: Point3::new(0.0, 0.0, thickness_mm), normal: Vector3::z_axis() }
+}
+
+fn check_same(session: &Session, about: &About, plan: &Plan) -> Result<(), ScanError> {
+    let another = |what| Err(ScanError::Another { folder: session.folder.clone(), what });
+    if session.kind != Kind::Swatch {
+        return another("it is no scan of a swatch".to_owned());
+    }
+    if let Some(name) = about.name.as_ref().filter(|name| **name != session.name) {
+        return another(format!("it is named {:?}, not {name:?}", session.name));
+    }
+    let wanted = about.thickness_mm.map(level_plane);
+    if wanted.is_some() && wanted != session.plane {
+        return another("its plane is not at the given --thickness-mm".to_owned());
+    }
+    let strange =
+        session.frames.iter().find(|entry| !plan.steps.iter().any(|step| is_of(entry, step)));
+    match strange {
+        Some(entry) => another(format!(
+            "{} is no frame of this scan (other lights or bracket)",
+            entry.file.display()
+        )),
+        None => Ok(()),
+    }
+}
+
+fn is_of(entry: &FrameEntry, step: &Step) -> bool {
+    let stem = entry.file.file_stem().unwrap_or_default().to_string_lossy();
+    let stem = stem.split_once("-take-").map_or(&*stem, |(stem, _)| stem);
+    stem == step.stem && entry.light == step.light && entry.drift_check == step.drift_check
+}
+
+/// Sees that the frames will fit on the disk.
+pub(super) fn check_room(
+    folder: &Path,
+    size_px: [usize; 2],
+    frames: usize,
+) -> Result<(), ScanError> {
+    let each = 2 * (size_px[0] * size_px[1]) as u64 + FRAME_EXTRA;
+    let needed = each * frames as u64;
+    // The folder may not be there yet.
+    let existing = folder.ancestors().find(|f| f.exists()).unwrap_or(Path::new("."));
+    match free_bytes(existing) {
+        Some(free) if free < needed => Err(ScanError::NoRoom {
+            folder: folder.to_owned(),
+            free_mb: free >> 20,
+            needed_mb: needed.div_ceil(1 << 20),
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::scan::plan::tests::reference_rig;
+
+    const ABOUT: About = About { name: None, thickness_mm: None };
+
+    fn plan() -> Plan {
+        Plan::new(&reference_rig(), &[]).unwrap()
+    }
+
+    fn open(folder: &Path, begin: Begin) -> Result<(Store, Found), ScanError> {
+        Store::open(folder, &ABOUT, begin, &plan())
+    }
+
+    fn keep(store: &mut Store, step: usize, content: &str) {
+        let path = store.incoming().join("DSC_1.NEF");
+        fs::write(&path, content).unwrap();
+        let plan = plan();
+        let entry = FrameEntry::new("", plan.steps[step].light, 0.5, 100.0);
+        let bytes = content.as_bytes();
+        store.keep(&plan, Taken { step, path: &path, bytes, entry }).unwrap();
+    }
+
+    #[test]
+    fn what_is_kept_is_found_again() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("scans/linen");
+        let (mut store, found) = open(&folder, Begin::Resume).unwrap();
+        assert!(found.finished.is_empty());
+        for step in [0, 4, 11] {
+            keep(&mut store, step, "one");
+        }
+        keep(&mut store, 4, "two");
+        drop(store);
+        assert!(!folder.join(INCOMING).exists());
+        let error = open(&folder, Begin::Anew).unwrap_err().to_string();
+        assert!(error.contains("(linen, 3 frames); continue it with --resume"), "{error}");
+        // Files of a killed scan that nobody recorded.
+        fs::write(folder.join("light-05.nef"), "half").unwrap();
+        fs::create_dir(folder.join(INCOMING)).unwrap();
+        fs::write(folder.join(INCOMING).join("DSC_2.NEF"), "half").unwrap();
+        let (mut store, found) = open(&folder, Begin::Resume).unwrap();
+        assert_eq!(found.finished, [0, 4, 11]);
+        assert_eq!(found.settings, Some(Settings { exposure_s: 0.5, iso: 100.0 }));
+        assert_eq!(store.file(4), Some(folder.join("light-03-take-2.nef")));
+        assert!(!folder.join("light-03.nef").exists(), "replaced");
+        keep(&mut store, 5, "whole");
+        assert_eq!(fs::read_to_string(folder.join("light-04.nef")).unwrap(), "whole");
+        store.drop_frame(4).unwrap();
+        assert_eq!(store.session().frames.len(), 3);
+        assert!(!folder.join("light-03-take-2.nef").exists());
+    }
+
+    #[test]
+    fn altered_and_missing_frames_are_taken_again() {
+        let home = tempfile::tempdir().unwrap();
+        let (mut store, _) = open(home.path(), Begin::Resume).unwrap();
+        for step in [1, 2, 3] {
+            keep(&mut store, step, "one");
+        }
+        drop(store);
+        fs::write(home.path().join("light-00.nef"), "other").unwrap();
+        fs::remove_file(home.path().join("light-01.nef")).unwrap();
+        let (store, found) = open(home.path(), Begin::Resume).unwrap();
+        assert_eq!(found.finished, [3]);
+        assert_eq!(found.warnings.len(), 2, "{:?}", found.warnings);
+        assert_eq!(store.session().frames.len(), 1);
+    }
+
+    #[test]
+    fn another_capture_session_is_refused() {
+        let home = tempfile::tempdir().unwrap();
+        let (mut store, _) = open(home.path(), Begin::Anew).unwrap();
+        keep(&mut store, 9, "one");
+        drop(store);
+        let check = |about: About, plan: &Plan, expected: &str| {
+            let error = Store::open(home.path(), &about, Begin::Resume, plan).unwrap_err();
+            assert!(error.to_string().contains(expected), "{error}");
+        };
+        check(About { name: Some("denim".into()), ..ABOUT }, &plan(), "not \"denim\"");
+        check(About { thickness_mm: Some(2.0), ..ABOUT }, &plan(), "--thickness-mm");
+        let mut fewer = reference_rig();
+        fewer.lights.truncate(5);
+        check(ABOUT, &Plan::new(&fewer, &[]).unwrap(), "light-08.nef is no frame of this scan");
+        fs::write(home.path().join(MANIFEST), "schema = 1\nkind = \"white\"\n").unwrap();
+        check(ABOUT, &plan(), "no scan of a swatch");
+    }
+
+    #[test]
+    fn room_on_the_disk() {
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().join("not/there/yet");
+        check_room(&folder, [32, 32], 12).unwrap();
+        let error = check_room(&folder, [60_000, 60_000], 1_000_000).unwrap_err().to_string();
+        assert!(error.contains("MB free, but the frames need about"), "{error}");
+    }
+}
