@@ -3,6 +3,8 @@
 # make build   the release executables with every feature, in target/release
 # make firmware the light board's firmware, and the simulated board that tests run it in
 # make soak    light board and host for fifteen minutes over a bad wire
+# make kills   the program killed two hundred times while it scans, at the simulated board
+# make scan-timing   wall time of a scan of full-size frames beside exposure and transfer
 # make bench   run time against error and against touching the bytes once
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
@@ -15,7 +17,7 @@ TETHER_PACKAGES := pkg-config clang libclang-dev libgphoto2-dev
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
-.PHONY: demo test build bench soak firmware packages-demo packages-all packages-firmware
+.PHONY: demo test build bench soak kills scan-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -52,3 +54,9 @@ bench: packages-all
 SOAK_S ?= 900
 soak: packages-all firmware
 	WEAVELIGHT_SOAK_S=$(SOAK_S) cargo test --locked --release --test board -- --ignored --nocapture fifteen_minutes
+
+kills: packages-all firmware
+	cargo test --locked --release --test scan -- --ignored --nocapture two_hundred_kills
+
+scan-timing: packages-all firmware
+	cargo test --locked --release --test scan -- --ignored --nocapture ten_full_size_frames

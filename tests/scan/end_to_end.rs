@@ -5,7 +5,7 @@ use crate::simboard::SimBoard;
 use std::path::Path;
 use weavelight::compare::{self, Figures, Kind};
 use weavelight::device::board::PortChoice;
-use weavelight::device::scan::Begin;
+use weavelight::device::scan::{Begin, Options};
 use weavelight::session::Session;
 use weavelight::solve;
 use weavelight_sim::cloth::Preset;
@@ -36,7 +36,10 @@ fn the_scan_solves_to_the_right_fabric() {
     });
     let mut camera = laboratory.camera(Line::eyes(&sim), 0, none());
     let port = PortChoice::Path(sim.port());
-    let summary = laboratory.scan(port, &mut camera, Begin::Anew).unwrap();
+    // As `simulate` exposes it.
+    let own = Session::load(&laboratory.path("rig/swatch")).unwrap().frames[0].exposure_s;
+    let options = Options { exposure_s: Some(own), iso: 100.0, ..laboratory.options(Begin::Anew) };
+    let summary = laboratory.scan_with(port, &mut camera, &options).unwrap();
     assert_eq!((summary.frames, summary.retries, summary.warnings), (12, vec![], vec![]));
     assert_eq!(laboratory.check_frames(), 12);
     assert_eq!(Line::to(&sim).pins(), 0, "dark afterwards");

@@ -290,7 +290,6 @@ fn something_else(answer: fn(&str) -> String) -> PathBuf {
     theirs.set_exclusive(false).unwrap();
     let name = theirs.name().unwrap();
     std::thread::spawn(move || {
-        let _open = theirs;
         let mut bytes = [0; 64];
         loop {
             match ours.read(&mut bytes) {

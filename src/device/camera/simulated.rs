@@ -9,6 +9,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use weavelight_sim::render::{Fabric, Shot, Signals, Stage, Subject, Tile, shoot};
+use weavelight_sim::sensor::Sensor;
 
 /// Which outputs of the light board are lit at this moment: bit n is output n.
 pub type Eyes = Box<dyn Fn() -> u32 + Send>;
@@ -75,6 +76,9 @@ impl SimulatedCamera {
 
     fn photograph(&self, open: u32, close: u32) -> Vec<u16> {
         let Instrument { stage, sensor, .. } = &self.instrument;
+        let gain = self.settings.iso / 100.0;
+        // The range ends at fewer electrons: shorter exposures have more noise.
+        let sensor = Sensor { full_well_e: sensor.full_well_e / gain, ..sensor.clone() };
         let strengths = self.strengths(open, close);
         let lights = strengths.iter().map(|&(light, _)| stage.lights[light].clone()).collect();
         let lit = Lit {
@@ -86,12 +90,12 @@ impl SimulatedCamera {
         let first = stage.lights[..1].to_vec();
         let shot = Shot {
             light: Some(0),
-            exposure: self.settings.exposure_s * self.settings.iso / 100.0,
+            exposure: self.settings.exposure_s * gain,
             strength: 1.0,
             number: FIRST_SHOT + self.shots,
         };
         let seen = Stage { lights: first, ..stage.clone() };
-        shoot(&lit, &seen, sensor, &[shot], &|_| ()).pop().unwrap_or_default()
+        shoot(&lit, &seen, &sensor, &[shot], &|_| ()).pop().unwrap_or_default()
     }
 }
 

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::Duration;
 
+const UNREADABLE: &str = "the file makes the decoder fail";
+
 /// What a frame turned out to be.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Seen {
@@ -33,7 +35,10 @@ impl Judge {
         let (outbox, results) = mpsc::channel();
         std::thread::spawn(move || {
             for (step, path) in inbox {
-                if outbox.send((step, judge(&path, size_px))).is_err() {
+                // A decoder that fails on a file must not end the scan.
+                let seen = std::panic::catch_unwind(|| judge(&path, size_px));
+                let seen = seen.unwrap_or_else(|_| Seen::Damaged(UNREADABLE.to_owned()));
+                if outbox.send((step, seen)).is_err() {
                     return;
                 }
             }

@@ -65,9 +65,9 @@ pub fn scan(
 ) -> Result<Summary, ScanError> {
     let start = Instant::now();
     let plan = check(rig, options, camera)?;
-    let (store, found) = Store::open(&options.folder, &options.about, options.begin, &plan)?;
     let size_px = [rig.camera.width_px, rig.camera.height_px];
-    check_room(&options.folder, size_px, plan.steps.len() - found.finished.len())?;
+    check_room(&options.folder, size_px, plan.steps.len())?;
+    let (store, found) = Store::open(&options.folder, &options.about, options.begin, &plan)?;
     let mut run = Run {
         sequencer: Sequencer::new(&plan, &found.finished),
         assessor: Assessor::new(&plan),

@@ -220,12 +220,14 @@ fn is_of(entry: &FrameEntry, step: &Step) -> bool {
     stem == step.stem && entry.light == step.light && entry.drift_check == step.drift_check
 }
 
-/// Sees that the frames will fit on the disk.
+/// Sees that the frames will fit on the disk, before anything is begun: those that are there already need no more room.
 pub(super) fn check_room(
     folder: &Path,
     size_px: [usize; 2],
     frames: usize,
 ) -> Result<(), ScanError> {
+    let there = Session::load(folder).map_or(0, |session| session.frames.len());
+    let frames = frames.saturating_sub(there);
     let each = 2 * (size_px[0] * size_px[1]) as u64 + FRAME_EXTRA;
     let needed = each * frames as u64;
     // The folder may not be there yet.
