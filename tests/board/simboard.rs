@@ -75,6 +75,7 @@ impl SimBoard {
     }
 
     /// Its control socket: several may use it at once.
+    #[allow(dead_code, reason = "the scan's tests use it")]
     pub(crate) fn socket(&self) -> PathBuf {
         self.folder.path().join("control")
     }

@@ -43,7 +43,23 @@ pub(crate) enum Mishap {
 
 impl Laboratory {
     pub(crate) fn new(size_px: [usize; 2], change: impl Fn(&mut simulate::Options)) -> Self {
-        let home = tempfile::tempdir().unwrap();
+        Self::in_folder(home(), size_px, change)
+    }
+
+    /// On the disk, whose speed matters for timings.
+    pub(crate) fn on_disk(size_px: [usize; 2]) -> Self {
+        // Neither swatch nor truth: only the rig is wanted.
+        Self::in_folder(tempfile::tempdir().unwrap(), size_px, |options| {
+            options.only = vec![Part::Board];
+            options.targets.boards = 1;
+        })
+    }
+
+    fn in_folder(
+        home: tempfile::TempDir,
+        size_px: [usize; 2],
+        change: impl Fn(&mut simulate::Options),
+    ) -> Self {
         let mut options = simulate::Options {
             out: home.path().join("rig"),
             size_px: Some(size_px),
@@ -123,6 +139,13 @@ impl Laboratory {
         }
         session.frames.len()
     }
+}
+
+/// In memory where there is such a place: a killed process leaves the same there as on a disk, and flushing costs nothing.
+fn home() -> tempfile::TempDir {
+    let memory = Path::new("/dev/shm");
+    let there = memory.is_dir().then(|| tempfile::tempdir_in(memory).ok()).flatten();
+    there.unwrap_or_else(|| tempfile::tempdir().unwrap())
 }
 
 /// A connection to the control socket.

@@ -61,7 +61,7 @@ impl Camera for Prerendered {
 #[ignore = "renders full-size frames: make scan-timing"]
 fn ten_full_size_frames() {
     let Some(sim) = SimBoard::on_a_port(&[]) else { return };
-    let laboratory = Laboratory::new(FULL, |_| ());
+    let laboratory = Laboratory::on_disk(FULL);
     let wanted = Settings { exposure_s: EXPOSURE_S, iso: 100.0 };
     let mut frames = std::collections::HashMap::new();
     for lit in std::iter::once(0).chain((0..10).map(|light| 1 << light)) {

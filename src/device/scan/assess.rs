@@ -8,8 +8,9 @@ use super::sequencer::Judgement;
 const DARK: f64 = 0.1;
 /// Less than this share of the range over the ambient light is no light, whatever the others give.
 const NOTHING: f64 = 5e-4;
-/// Lights whose pictures differ by less than this share are one light.
-const ALIKE: f64 = 0.005;
+/// Lights whose pictures differ by no more than twice what noise makes of one light are one light; the noise is known from the
+/// drift check. Between these shares: less is no difference, and cloth under two lamps of a rig differs by more.
+const ALIKE: [f64; 2] = [0.005, 0.03];
 /// Above this share of clipped samples the exposure should be shorter.
 const CLIPPED: f64 = 0.005;
 /// Below this brightness, as a fraction of the range, the exposure should be longer.
@@ -139,7 +140,9 @@ impl Assessor {
             .filter_map(|(k, step, _)| Some((step.light?, self.sketch(k)?)))
             .collect();
         let pairs = (0..sketches.len()).flat_map(|a| (0..a).map(move |b| (b, a)));
-        let alike = pairs.filter(|&(a, b)| difference(&sketches[a].1, &sketches[b].1) < ALIKE);
+        let noise = self.repeated_difference().unwrap_or(0.0);
+        let most = (2.0 * noise).clamp(ALIKE[0], ALIKE[1]);
+        let alike = pairs.filter(|&(a, b)| difference(&sketches[a].1, &sketches[b].1) < most);
         alike
             .map(|(a, b)| {
                 format!(
@@ -148,6 +151,15 @@ impl Assessor {
                 )
             })
             .collect()
+    }
+
+    /// How much the light of the drift check differs from itself.
+    fn repeated_difference(&self) -> Option<f64> {
+        let again = self.steps.iter().position(|step| step.drift_check)?;
+        let light = self.steps[again].light;
+        let same = |step: &Step| step.light == light && step.factor == 1.0 && !step.drift_check;
+        let first = self.steps.iter().position(same)?;
+        Some(difference(&self.sketch(first)?, &self.sketch(again)?))
     }
 
     /// The sketch with the ambient light taken off.

@@ -151,7 +151,7 @@ impl Run<'_> {
             let input = match self.sequencer.next(now) {
                 Action::Light(step) => self.light(step)?,
                 Action::Expose(step) => self.expose(step),
-                Action::Keep(step) => self.keep(step)?,
+                Action::Keep(step) => self.keep(step),
                 Action::FindBoard => self.find_board(),
                 Action::Drop(step) => {
                     self.store.drop_frame(step)?;
@@ -304,20 +304,23 @@ impl Run<'_> {
         trouble
     }
 
-    fn keep(&mut self, step: usize) -> Result<Input, ScanError> {
+    fn keep(&mut self, step: usize) -> Input {
         let begun = Instant::now();
-        let Some(shot) = self.shot.take() else { return Ok(Input::NotKept(Trouble::Lasting)) };
+        let Some(shot) = self.shot.take() else { return Input::NotKept(Trouble::Lasting) };
         let bytes = match std::fs::read(&shot.path) {
             Ok(bytes) => bytes,
             Err(error) => {
                 let error = FileError::read(&shot.path, error).to_string();
-                return Ok(Input::NotKept(Trouble::Passing(error)));
+                return Input::NotKept(Trouble::Passing(error));
             }
         };
-        if bytes.starts_with(JPEG) {
-            return Err(CameraError::NotRaw { found: "JPEG".to_owned() }.into());
-        }
-        let settings = self.exposed(step, &shot, &bytes)?;
+        let settings = match self.exposed(step, &shot, &bytes) {
+            Ok(settings) => settings,
+            Err(error) => {
+                self.error = Some(error.to_string());
+                return Input::NotKept(Trouble::Lasting);
+            }
+        };
         let entry = self.entry(step, &shot, settings);
         let taken = Taken { step, path: &shot.path, bytes: &bytes, entry };
         let input = match self.store.keep(&self.plan, taken) {
@@ -331,12 +334,15 @@ impl Run<'_> {
             }
         };
         self.seconds.disk += begun.elapsed().as_secs_f64();
-        Ok(input)
+        input
     }
 
-    /// How a frame was exposed: as set, else as its file says. The first file of a camera that is set by hand sets the scan's
+    /// How a frame was exposed, if it is a RAW file: as set, else as its file says. The first file of a camera that is set by hand sets the scan's
     /// exposure.
     fn exposed(&mut self, step: usize, shot: &Shot, bytes: &[u8]) -> Result<Settings, ScanError> {
+        if bytes.starts_with(JPEG) {
+            return Err(CameraError::NotRaw { found: "JPEG".to_owned() }.into());
+        }
         let said = raw::metadata(bytes);
         let wanted = shot.settings.or(self.base).or(self.wanted);
         let found = match (said.exposure_s, said.iso, wanted) {
