@@ -300,6 +300,13 @@ fn camera() -> Vec<Case> {
             || Mishap::Error(E::LinkLost { reason: "end of file".to_owned() }),
         ),
         camera(
+            "busy with its menus",
+            "light 2 was taken again: the camera is busy with something else; leave its menus",
+            Complete,
+            Once,
+            || Mishap::Error(E::Busy),
+        ),
+        camera(
             "never ready",
             "light 2: the camera is not ready after 20 s; switch it off and on. 3 frames are safe",
             Resumes,

@@ -2,8 +2,10 @@
 
 use super::ScanError;
 use crate::device::board::{Board, PortChoice};
+use crate::device::camera::tethered::{self, FoundCamera};
 use crate::device::camera::{
-    Camera, CameraError, SimulatedCamera, UsbCamera, Waiting, WatchedCamera, usb_cameras,
+    Camera, CameraError, SimulatedCamera, Tether, TetheredCamera, UsbCamera, Waiting,
+    WatchedCamera, usb_cameras,
 };
 use crate::instrument::{CameraKind, Rig};
 use crate::simulate::Scene;
@@ -46,7 +48,8 @@ pub struct CameraFinding {
     pub problem: Option<String>,
 }
 
-/// Looks for the camera that `rig`, read from `path`, describes; without a rig, for any on the USB. None is opened.
+/// Looks for the camera that `rig`, read from `path`, describes; without a rig, for any on the USB. A tethered one is held for a
+/// moment; nothing is set or released.
 pub fn diagnose_camera(rig: Option<(&Rig, &Path)>) -> Vec<CameraFinding> {
     let finding = |what: &str, result: Result<(), String>| {
         vec![CameraFinding { what: what.to_owned(), problem: result.err() }]
@@ -58,18 +61,45 @@ pub fn diagnose_camera(rig: Option<(&Rig, &Path)>) -> Vec<CameraFinding> {
             let what = opened.as_ref().map_or("rig.toml".to_owned(), |c| c.describe().model);
             finding(&what, opened.map(drop))
         }
-        _ => {
-            let cameras = usb_cameras();
-            if cameras.is_empty() {
-                return finding("USB", Err(CameraError::NoneFound.to_string()));
-            }
-            let one = |camera: UsbCamera| CameraFinding {
-                problem: camera.problem().map(|problem| problem.to_string()),
-                what: camera.name,
-            };
-            cameras.into_iter().map(one).collect()
+        Some((rig, _)) => {
+            let CameraKind::Tethered { port } = &rig.camera.kind else { return Vec::new() };
+            tethered_cameras(port.clone())
         }
+        None => tethered_cameras(None),
     }
+}
+
+/// As libgphoto2 sees them; without it, as the system does.
+fn tethered_cameras(port: Option<String>) -> Vec<CameraFinding> {
+    let found = tethered::diagnose(&Tether::new(port));
+    let version = CameraFinding {
+        what: found
+            .libgphoto2
+            .as_ref()
+            .map_or("tethering".to_owned(), |v| format!("libgphoto2 {v}")),
+        problem: found.libgphoto2.as_ref().err().map(ToString::to_string),
+    };
+    let on_usb = |camera: UsbCamera| CameraFinding {
+        problem: camera.problem().map(|problem| problem.to_string()),
+        what: camera.name,
+    };
+    let held = |camera: FoundCamera| {
+        let battery = camera.battery_percent.map(|percent| format!(", battery {percent} %"));
+        CameraFinding {
+            what: format!("{} at {}{}", camera.model, camera.port, battery.unwrap_or_default()),
+            problem: camera.problem.map(|problem| problem.to_string()),
+        }
+    };
+    let mut cameras: Vec<CameraFinding> = match found.libgphoto2 {
+        Ok(_) => found.cameras.into_iter().map(held).collect(),
+        Err(_) => usb_cameras().into_iter().map(on_usb).collect(),
+    };
+    if cameras.is_empty() {
+        let problem = Some(CameraError::NoneFound.to_string());
+        cameras.push(CameraFinding { what: "USB".to_owned(), problem });
+    }
+    cameras.insert(0, version);
+    cameras
 }
 
 fn open_camera(rig: &Rig, path: &Path, choice: &PortChoice) -> Result<Box<dyn Camera>, ScanError> {
@@ -86,9 +116,8 @@ fn open_camera(rig: &Rig, path: &Path, choice: &PortChoice) -> Result<Box<dyn Ca
             camera.check()?;
             Ok(Box::new(camera))
         }
-        CameraKind::Tethered { .. } => Err(CameraError::Other {
-            what: "tethered cameras are not part of this build; choose kind = \"watched\" with a folder = \"...\" in rig.toml, and let another program save there".to_owned(),
+        CameraKind::Tethered { port } => {
+            Ok(Box::new(TetheredCamera::open(Tether::new(port.clone()))?))
         }
-        .into()),
     }
 }
