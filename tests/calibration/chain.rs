@@ -58,6 +58,16 @@ fn states_its_making(folder: &Path) {
     assert!(defects.contains("created") && defects.contains("inputs"), "{defects}");
 }
 
+/// The board on the table lies along the pixels' rows; this one's corners are the worst of its set, and good all the same.
+#[test]
+fn the_board_on_the_table_is_kept() {
+    let bench = Bench::new(&[Part::Board], |o| (o.seed, o.size_px) = (2, Some([1232, 816])));
+    let report = bench.camera().unwrap();
+    assert!(report.boards.iter().all(|board| board.dropped.is_none()), "{:?}", report.boards);
+    let truth = Calibration::load(&bench.truth()).unwrap().camera.unwrap();
+    assert!((report.intrinsics_px[0] / truth.fx - 1.0).abs() < 5e-4, "{:?}", report.intrinsics_px);
+}
+
 #[test]
 fn the_wizard_asks_for_one_thing_at_a_time() {
     let bench = Bench::new(&[Part::WhiteFlat], |o| o.flaws.exposure_factor = 0.4);
