@@ -1,17 +1,18 @@
 //! Photosites side by side: a block holds 32 of them, every quantity an array over its lanes, so that each loop over
 //! lanes becomes vector instructions of whatever width the processor has.
 //!
-//! Multiplications and additions are written out, never fused: the same operations in the same order on every lane, hence
-//! the same bits on every processor.
+//! Where a product is added to something, that is a fused `mul_add`, never left to the compiler: the same operations in the
+//! same order on every lane, hence the same bits on every processor. (One without the instruction computes it in software:
+//! slow, but x86 has had it since 2013 and ARM since its 64 bits.)
 
 use std::ops::Range;
 
 use super::method::{RELATIVE_FLOOR, START_LEVEL};
-use super::pieces::{Piece, Pieces};
+use super::pieces::Pieces;
 use super::row::{RowInput, VarianceModel};
 
 /// Photosites of a block.
-pub(crate) const LANES: usize = 32;
+pub(crate) const LANES: usize = 16;
 
 /// One number a photosite.
 pub(crate) type Lanes = [f32; LANES];
@@ -28,18 +29,22 @@ pub(crate) struct Block {
     neighbours: bool,
     /// Where they stand in the row.
     pub(crate) column: [usize; LANES],
-    /// Whether at an odd column (the row's second colour filter).
-    pub(crate) odd: [u32; LANES],
-    pub(crate) noise_scale: Lanes,
     /// The brightest usable sample.
     pub(crate) level: Lanes,
     /// Samples above [`START_LEVEL`] of it.
     pub(crate) bright: Lanes,
     pub(crate) sample: Vec<Sample>,
+    /// Samples of neighbours that are fewer than the lanes.
+    pub(crate) padded: Vec<Lanes>,
+    /// Columns of neighbours that have not been solved.
+    pub(crate) refused: Vec<usize>,
+    /// Parity of the first column for which the noise models stand, where these are not scaled.
+    noise_of: Option<usize>,
 }
 
-/// What a block knows of one light.
+/// What a block knows of one light. Aligned, or every vector would straddle two cache lines.
 #[derive(Clone)]
+#[repr(C, align(64))]
 pub(crate) struct Sample {
     /// y, zero where unusable.
     pub(crate) y: Lanes,
@@ -51,7 +56,12 @@ pub(crate) struct Sample {
     pub(crate) light: [Lanes; 3],
     /// Weight of the latest solve.
     pub(crate) weight: Lanes,
-    pub(crate) variance: [VarianceModel; 2],
+    /// The noise model of each photosite, scaled as its gain maps ask.
+    pub(crate) shot: Lanes,
+    pub(crate) floor: Lanes,
+    pub(crate) kappa: Lanes,
+    /// Of even and odd columns.
+    variance: [VarianceModel; 2],
 }
 
 impl Block {
@@ -63,88 +73,83 @@ impl Block {
             usable: ZERO,
             light: [ZERO; 3],
             weight: ZERO,
+            shot: ZERO,
+            floor: ZERO,
+            kappa: ZERO,
             variance: [VarianceModel::default(); 2],
         };
         self.sample.resize(input.field.lights, blank);
         for (sample, variance) in self.sample.iter_mut().zip(input.variance) {
             sample.variance = variance.map(|model| model.clean());
         }
+        self.noise_of = None;
     }
 
-    /// Loads neighbours: columns `start..start + len` of a piece.
+    /// Takes the place of neighbours, without their samples.
     #[inline(always)]
-    pub(crate) fn load(
-        &mut self,
-        input: &RowInput,
-        pieces: &Pieces,
-        piece: &Piece,
-        columns: Range<usize>,
-    ) {
-        let start = columns.start;
+    pub(crate) fn place(&mut self, input: &RowInput, columns: &Range<usize>) {
         self.len = columns.len();
         self.neighbours = true;
+        if columns.len() < LANES {
+            self.pad(input, columns);
+        }
         for k in 0..LANES {
-            self.column[k] = start + k;
-            self.odd[k] = ((start + k) & 1) as u32;
+            self.column[k] = columns.start + k;
         }
-        self.noise_scale = [1.0; LANES];
-        if let Some(scale) = input.noise_scale {
-            copy_lanes(&mut self.noise_scale, &scale[columns.clone()]);
+        match input.noise_scale {
+            Some(scale) => self.set_noise(columns.start, &scale[columns.clone()]),
+            None if self.noise_of == Some(columns.start & 1) => {}
+            None => self.set_noise(columns.start, &[]),
         }
-        clean_scale(&mut self.noise_scale);
-        let offset = self.offset(piece);
-        for (i, sample) in self.sample.iter_mut().enumerate() {
-            match <&Lanes>::try_from(&input.signal[i][columns.clone()]) {
-                Ok(y) => sample.set(y),
-                Err(_) => sample.set_padded(&input.signal[i][columns.clone()]),
-            }
-            let linear = &pieces.light[piece.first + i];
-            for (axis, light) in sample.light.iter_mut().enumerate() {
-                let (a, b) = (linear.at_start[axis], linear.per_column[axis]);
-                for k in 0..LANES {
-                    light[k] = a + b * offset[k];
-                }
+        self.noise_of = input.noise_scale.is_none().then_some(columns.start & 1);
+    }
+
+    /// Noise models of neighbours, whose scale is 1 where it is not given.
+    #[inline(never)]
+    fn set_noise(&mut self, start: usize, scale: &[f32]) {
+        for sample in &mut self.sample {
+            for k in 0..LANES {
+                sample.set_noise(k, start + k, scale.get(k).copied().unwrap_or(1.0));
             }
         }
-        self.find_level();
+    }
+
+    /// Samples of neighbours that do not fill the lanes.
+    #[inline(never)]
+    fn pad(&mut self, input: &RowInput, columns: &Range<usize>) {
+        self.padded.resize(input.signal.len(), ZERO);
+        for (padded, signal) in self.padded.iter_mut().zip(input.signal) {
+            *padded = [f32::NAN; LANES];
+            padded[..columns.len()].copy_from_slice(&signal[columns.clone()]);
+        }
     }
 
     /// Loads photosites from anywhere in the row.
+    #[inline(always)]
     pub(crate) fn gather(&mut self, input: &RowInput, pieces: &Pieces, places: &[Place]) {
         self.len = places.len();
         self.neighbours = false;
+        self.noise_of = None;
         for (k, place) in places.iter().enumerate() {
             self.column[k] = place.column;
-            self.odd[k] = (place.column & 1) as u32;
-            self.noise_scale[k] = input.noise_scale.map_or(1.0, |scale| scale[place.column]);
         }
-        clean_scale(&mut self.noise_scale);
         for (i, sample) in self.sample.iter_mut().enumerate() {
             let mut y = [f32::NAN; LANES];
             for (k, place) in places.iter().enumerate() {
                 y[k] = input.signal[i][place.column];
+                let scale = input.noise_scale.map_or(1.0, |scale| scale[place.column]);
+                sample.set_noise(k, place.column, scale);
                 let piece = &pieces.list[place.piece];
                 let linear = &pieces.light[piece.first + i];
                 let offset = (place.column - piece.start) as f32;
                 for axis in 0..3 {
-                    sample.light[axis][k] =
-                        linear.at_start[axis] + linear.per_column[axis] * offset;
+                    let (a, b) = (linear.at_start[axis], linear.per_column[axis]);
+                    sample.light[axis][k] = b.mul_add(offset, a);
                 }
             }
             sample.set(&y);
         }
         self.find_level();
-    }
-
-    /// Columns from the piece's start, for a block of neighbours.
-    #[inline(always)]
-    pub(crate) fn offset(&self, piece: &Piece) -> Lanes {
-        let first = (self.column[0] - piece.start) as f32;
-        let mut offset = ZERO;
-        for k in 0..LANES {
-            offset[k] = first + k as f32;
-        }
-        offset
     }
 
     /// Leaves only samples that had a weight and are not in these sets (bit i for light i), for this solve and those to come.
@@ -156,13 +161,6 @@ impl Block {
                 }
                 sample.usable[k] = if sample.weight[k] > 0.0 { 1.0 } else { 0.0 };
             }
-        }
-    }
-
-    /// Gives every usable sample the weight 1.
-    pub(crate) fn weigh_equally(&mut self) {
-        for sample in &mut self.sample {
-            sample.weight = sample.usable;
         }
     }
 
@@ -184,8 +182,11 @@ impl Block {
         self.sample.iter().filter(|sample| sample.finite[k] > 0.0).count()
     }
 
-    /// Bit i is set if light i had a weight in the latest solve of lane `k`.
+    /// Bit i is set if light i had a weight in the latest solve of lane `k`; neighbours keep every light.
     pub(crate) fn kept(&self, k: usize) -> u64 {
+        if self.neighbours {
+            return u64::MAX >> (64 - self.sample.len());
+        }
         let lights = self.sample.iter().enumerate();
         lights.filter(|(_, sample)| sample.weight[k] > 0.0).fold(0, |kept, (i, _)| kept | 1 << i)
     }
@@ -200,14 +201,14 @@ impl Block {
         self.level = ZERO;
         for sample in &self.sample {
             for k in 0..LANES {
-                self.level[k] = self.level[k].max(sample.y[k].abs());
+                self.level[k] = larger(self.level[k], sample.y[k].abs());
             }
         }
         self.bright = ZERO;
         for sample in &self.sample {
             for k in 0..LANES {
-                self.bright[k] +=
-                    if sample.y[k] > START_LEVEL as f32 * self.level[k] { 1.0 } else { 0.0 };
+                let bright = sample.y[k] > START_LEVEL as f32 * self.level[k];
+                self.bright[k] += if bright { 1.0 } else { 0.0 };
             }
         }
     }
@@ -215,13 +216,19 @@ impl Block {
     /// Least variance that counts, per lane.
     #[inline(always)]
     pub(crate) fn least_variance(&self) -> Lanes {
-        let mut least = ZERO;
-        for k in 0..LANES {
-            let sigma = RELATIVE_FLOOR as f32 * self.level[k];
-            least[k] = (sigma * sigma).max(f32::MIN_POSITIVE);
-        }
-        least
+        least_variance(&self.level)
     }
+}
+
+/// Least variance that counts beside samples up to this level.
+#[inline(always)]
+pub(crate) fn least_variance(level: &Lanes) -> Lanes {
+    let mut least = ZERO;
+    for k in 0..LANES {
+        let sigma = RELATIVE_FLOOR as f32 * level[k];
+        least[k] = larger(sigma * sigma, f32::MIN_POSITIVE);
+    }
+    least
 }
 
 /// A photosite of a row and the piece that it lies on.
@@ -232,12 +239,22 @@ pub(crate) struct Place {
 }
 
 impl Sample {
-    /// A block's end that the row does not fill. Kept apart, or every block would be copied once more.
-    #[inline(never)]
-    fn set_padded(&mut self, values: &[f32]) {
-        let mut lanes = [f32::NAN; LANES];
-        lanes[..values.len()].copy_from_slice(values);
-        self.set(&lanes);
+    /// Gives lane `k` the noise model of its column; a scale that is not positive and finite counts as 1.
+    #[inline(always)]
+    fn set_noise(&mut self, k: usize, column: usize, scale: f32) {
+        let scale = if scale > 0.0 && scale < f32::INFINITY { scale } else { 1.0 };
+        let model = &self.variance[column & 1];
+        self.shot[k] = model.shot * scale;
+        self.floor[k] = model.floor * scale * scale;
+        self.kappa[k] = model.kappa;
+    }
+
+    /// var(y) of lane `k` at a predicted value.
+    #[inline(always)]
+    pub(crate) fn variance(&self, k: usize, predicted: f32) -> f32 {
+        let predicted = larger(predicted, 0.0);
+        let model_error = self.kappa[k] * predicted;
+        model_error.mul_add(model_error, self.shot[k].mul_add(predicted, self.floor[k]))
     }
 
     #[inline(always)]
@@ -245,9 +262,10 @@ impl Sample {
         for k in 0..LANES {
             let usable = y[k].abs() < f32::INFINITY;
             self.y[k] = if usable { y[k] } else { 0.0 };
-            self.finite[k] = if usable { 1.0 } else { 0.0 };
+            let usable = if usable { 1.0 } else { 0.0 };
+            self.finite[k] = usable;
+            self.usable[k] = usable;
         }
-        self.usable = self.finite;
     }
 }
 
@@ -259,17 +277,8 @@ impl VarianceModel {
     }
 }
 
+/// The larger of two numbers, the second where either is not one: a single instruction, other than `f32::max`.
 #[inline(always)]
-fn copy_lanes(lanes: &mut Lanes, values: &[f32]) {
-    match <&Lanes>::try_from(values) {
-        Ok(whole) => *lanes = *whole,
-        Err(_) => lanes[..values.len()].copy_from_slice(values),
-    }
-}
-
-#[inline(always)]
-fn clean_scale(scale: &mut Lanes) {
-    for s in scale {
-        *s = if *s > 0.0 && *s < f32::INFINITY { *s } else { 1.0 };
-    }
+pub(crate) fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

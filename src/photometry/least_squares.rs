@@ -1,107 +1,84 @@
-//! Plain least squares: pseudo-inverse times samples where a photosite has them all, normal equations where some are
-//! missing.
+//! Plain least squares of photosites with samples missing: normal equations over the others.
 
 use multiversion::multiversion;
 
 use super::block::{Block, LANES, Lanes, ZERO};
-use super::normal_equations::{Weighting, accumulate, times, variance};
-use super::pieces::{Linear, Piece, Pieces};
+use super::normal_equations::{Weighting, accumulate, add_square, dot, predict, times};
 use super::surface::Surface;
 
 /// Normal equations in float32 lose the square of the condition number; refined once, this much is carried.
 const NORMAL_EQUATIONS_CONDITION_SQUARED: f32 = 1000.0;
 
-/// Photosites of one piece, g = P y; carries those that have all their samples.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn solve_complete(block: &Block, pieces: &Pieces, piece: &Piece) -> Surface {
-    let offset = block.offset(piece);
-    let inverse = &pieces.inverse[piece.first..piece.first + block.sample.len()];
-    let mut g = [ZERO; 3];
-    for (sample, linear) in block.sample.iter().zip(inverse) {
-        let [px, py, pz] = columns(linear, &offset);
-        let [gx, gy, gz] = &mut g;
-        for k in 0..LANES {
-            gx[k] += px[k] * sample.y[k];
-            gy[k] += py[k] * sample.y[k];
-            gz[k] += pz[k] * sample.y[k];
-        }
-    }
-    unbend(&mut g, piece, &offset);
-    let mut surface = describe(block, g, |i| columns(&inverse[i], &offset));
-    for k in 0..LANES {
-        surface.carried[k] = surface.count[k] == block.sample.len() as f32;
-    }
-    surface
-}
-
-/// Takes off what mixing the pseudo-inverses of the piece's ends adds: t (1 - t) (P0 - P1) (L1 - L0) g.
-#[inline(always)]
-fn unbend(g: &mut [Lanes; 3], piece: &Piece, offset: &Lanes) {
-    let [bx, by, bz] = &piece.bend;
-    let [gx, gy, gz] = g;
-    for k in 0..LANES {
-        let t = offset[k] * piece.per_column;
-        let share = t * (1.0 - t);
-        let (x, y, z) = (gx[k], gy[k], gz[k]);
-        gx[k] -= share * (bx[0] * x + bx[1] * y + bx[2] * z);
-        gy[k] -= share * (by[0] * x + by[1] * y + by[2] * z);
-        gz[k] -= share * (bz[0] * x + bz[1] * y + bz[2] * z);
-    }
-}
-
 /// Photosites with samples missing: normal equations over the others, refined once on the residual.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn solve_masked(block: &mut Block) -> Surface {
     let first = accumulate(block, &[ZERO; 3], Weighting::Equal);
     let (inverse, condition_squared) = first.inverse();
     let mut g = times(&inverse, &first.right);
     let second = accumulate(block, &g, Weighting::Kept);
-    let change = times(&inverse, &second.right);
-    for (g, change) in g.iter_mut().zip(&change) {
+    add(&mut g, &times(&inverse, &second.right));
+    let mut surface = Surface::new(g, 0.0);
+    let mut spread = [ZERO; 6];
+    for sample in &block.sample {
+        let mut light = sample.light;
+        for axis in &mut light {
+            for k in 0..LANES {
+                axis[k] *= sample.usable[k];
+            }
+        }
+        let predicted = predict(&light, &surface.g);
+        let mut variance = ZERO;
         for k in 0..LANES {
-            g[k] += change[k];
+            variance[k] = sample.variance(k, predicted[k]);
+        }
+        add_square(&mut spread, &light, &variance);
+        for k in 0..LANES {
+            let residual = (sample.y[k] - predicted[k]) * sample.usable[k];
+            surface.squares[k] = residual.mul_add(residual, surface.squares[k]);
+            surface.count[k] += sample.usable[k];
         }
     }
-    let mut surface = describe(block, g, |i| times(&inverse, &block.sample[i].light));
+    surface.tangent_variance = sandwich_across(&surface, &inverse, &spread);
     for k in 0..LANES {
         surface.carried[k] = condition_squared[k] < NORMAL_EQUATIONS_CONDITION_SQUARED;
     }
     surface
 }
 
+/// Trace of the plain solution's covariance N (sum var l l^T) N across the normal.
 #[inline(always)]
-fn columns(linear: &Linear, offset: &Lanes) -> [Lanes; 3] {
-    let mut value = [ZERO; 3];
-    for axis in 0..3 {
-        let (a, b) = (linear.at_start[axis], linear.per_column[axis]);
+pub(crate) fn sandwich_across(
+    surface: &Surface,
+    inverse: &[Lanes; 6],
+    spread: &[Lanes; 6],
+) -> Lanes {
+    let [xx, xy, xz, yy, yz, zz] = inverse;
+    // Columns of N, then N's rows against spread times them: the diagonal suffices.
+    let mut trace = ZERO;
+    for column in [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] {
+        let column = column.map(|c| *c);
+        let through = times(spread, &column);
         for k in 0..LANES {
-            value[axis][k] = a + b * offset[k];
+            let c = [column[0][k], column[1][k], column[2][k]];
+            trace[k] += dot(c, [through[0][k], through[1][k], through[2][k]]);
         }
     }
-    value
+    let (normal, _) = surface.normal_and_length();
+    let column = times(inverse, &normal);
+    let through = times(spread, &column);
+    for k in 0..LANES {
+        let c = [column[0][k], column[1][k], column[2][k]];
+        trace[k] -= dot(c, [through[0][k], through[1][k], through[2][k]]);
+    }
+    trace
 }
 
-/// Residual and covariance (the sandwich P V P^T) of a plain solution; `column(i)` is light i's column of P.
+/// g += change.
 #[inline(always)]
-fn describe(block: &Block, g: [Lanes; 3], column: impl Fn(usize) -> [Lanes; 3]) -> Surface {
-    let mut surface = Surface::new(g, 0.0);
-    let (normal, _) = surface.normal_and_length();
-    let [gx, gy, gz] = &surface.g;
-    for (i, sample) in block.sample.iter().enumerate() {
-        let [lx, ly, lz] = &sample.light;
-        let [px, py, pz] = &column(i);
-        let [even, odd] = sample.variance;
+pub(crate) fn add(g: &mut [Lanes; 3], change: &[Lanes; 3]) {
+    for (g, change) in g.iter_mut().zip(change) {
         for k in 0..LANES {
-            let predicted = lx[k] * gx[k] + ly[k] * gy[k] + lz[k] * gz[k];
-            let residual = (sample.y[k] - predicted) * sample.usable[k];
-            let along = px[k] * normal[0][k] + py[k] * normal[1][k] + pz[k] * normal[2][k];
-            let across = px[k] * px[k] + py[k] * py[k] + pz[k] * pz[k] - along * along;
-            let model = if block.odd[k] == 0 { even } else { odd };
-            let noise = variance(model, predicted, block.noise_scale[k]) * sample.usable[k];
-            surface.squares[k] += residual * residual;
-            surface.tangent_variance[k] += across.max(0.0) * noise;
-            surface.count[k] += sample.usable[k];
+            g[k] += change[k];
         }
     }
-    surface
 }

@@ -17,10 +17,12 @@ pub enum Method {
 /// Most lights of a rig.
 pub const MAX_LIGHTS: usize = 64;
 
-/// Weighted solves after the plain start; each takes its weights from the fit before it.
+/// Weighted solves after the plain start, each with the weights of the fit before it, where noise does not explain the first
+/// with every sample. (Where it does, one is enough: a second lets the noise of dim samples choose their weights, which
+/// biases albedo.)
 pub(crate) const REWEIGHTINGS: usize = 2;
 
-/// The plain start of a weighted solve leaves out samples below this share of the photosite's brightest: at a steep
+/// The plain start of such a solve leaves out samples below this share of the photosite's brightest: at a steep
 /// tilt nearly half of the lights stand behind the surface and would pull the start far off.
 pub(crate) const START_LEVEL: f64 = 0.05;
 

@@ -13,6 +13,7 @@
 )]
 
 mod block;
+mod complete;
 mod least_squares;
 mod method;
 mod noise;
@@ -28,6 +29,7 @@ mod subset;
 mod surface;
 mod tighten;
 mod weighted;
+mod wide;
 
 #[cfg(test)]
 mod tests;

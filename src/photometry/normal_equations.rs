@@ -2,20 +2,15 @@
 
 use multiversion::multiversion;
 
-use super::block::{Block, LANES, Lanes, ZERO};
+use super::block::{Block, LANES, Lanes, Sample, ZERO, larger};
 use super::method::{BEHIND_DEVIATIONS, BEHIND_LEVEL, LIT_ABOVE_FLOOR, START_LEVEL, START_SAMPLES};
-use super::row::VarianceModel;
 
-/// sum w l l^T, sum w l r and company, with r = y - l . g the residual at the g that the sums were taken at.
+/// sum w l l^T and sum w l r, with r = y - l . g the residual at the g that the sums were taken at.
 pub(crate) struct Sums {
     /// sum w l l^T: xx, xy, xz, yy, yz, zz.
     pub(crate) matrix: [Lanes; 6],
     /// sum w l r.
     pub(crate) right: [Lanes; 3],
-    /// sum w r^2.
-    pub(crate) chi_square: Lanes,
-    /// Samples with a weight.
-    pub(crate) count: Lanes,
 }
 
 /// Where the weights come from.
@@ -32,58 +27,48 @@ pub(crate) enum Weighting {
 }
 
 /// Takes the sums at `g` and leaves the weights in the block.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn accumulate(block: &mut Block, g: &[Lanes; 3], weighting: Weighting) -> Sums {
-    let mut sums = Sums { matrix: [ZERO; 6], right: [ZERO; 3], chi_square: ZERO, count: ZERO };
+    let mut sums = Sums::none();
     let least = block.least_variance();
     for sample in &mut block.sample {
-        let [lx, ly, lz] = &sample.light;
-        let (mut predicted, mut residual) = (ZERO, ZERO);
+        let predicted = predict(&sample.light, g);
+        let mut residual = ZERO;
         for k in 0..LANES {
-            predicted[k] = lx[k] * g[0][k] + ly[k] * g[1][k] + lz[k] * g[2][k];
             residual[k] = sample.y[k] - predicted[k];
         }
+        let mut weight = ZERO;
         match weighting {
-            Weighting::Equal => sample.weight = sample.usable,
-            Weighting::Kept => {}
+            Weighting::Equal => weight = sample.usable,
+            Weighting::Kept => weight = sample.weight,
             Weighting::Bright => {
                 for k in 0..LANES {
                     let bright = sample.y[k] > START_LEVEL as f32 * block.level[k];
                     let few = block.bright[k] < START_SAMPLES as f32;
-                    sample.weight[k] = if bright || few { sample.usable[k] } else { 0.0 };
+                    weight[k] = if bright || few { sample.usable[k] } else { 0.0 };
                 }
             }
             Weighting::Noise => {
-                let [even, odd] = sample.variance;
                 for k in 0..LANES {
-                    let predicted = predicted[k];
-                    let model = if block.odd[k] == 0 { even } else { odd };
-                    let scale = block.noise_scale[k];
-                    let variance = variance(model, predicted, scale).max(least[k]);
-                    let lit = is_lit(model, predicted, sample.y[k], block.level[k], scale);
-                    sample.weight[k] = if lit { sample.usable[k] / variance } else { 0.0 };
+                    let variance = larger(sample.variance(k, predicted[k]), least[k]);
+                    let lit = is_lit(sample, k, predicted[k], block.level[k]);
+                    weight[k] = if lit { sample.usable[k] / variance } else { 0.0 };
                 }
             }
         }
-        sums.add(&sample.light, &sample.weight, &residual);
+        sums.add(&sample.light, &weight, &residual);
+        sample.weight = weight;
     }
     sums
 }
 
-/// var(y) at a predicted value.
-#[inline(always)]
-pub(crate) fn variance(model: VarianceModel, predicted: f32, noise_scale: f32) -> f32 {
-    let predicted = predicted.max(0.0);
-    let model_error = model.kappa * predicted;
-    noise_scale * (model.shot * predicted + model.floor * noise_scale) + model_error * model_error
-}
-
 /// Whether a light stands in front of the surface, see [`LIT_ABOVE_FLOOR`]. Squares stand for the roots.
 #[inline(always)]
-fn is_lit(model: VarianceModel, predicted: f32, y: f32, level: f32, noise_scale: f32) -> bool {
+fn is_lit(sample: &Sample, k: usize, predicted: f32, level: f32) -> bool {
     let square = |a: f32| a * a;
-    let floor = variance(model, 0.0, noise_scale) * square(LIT_ABOVE_FLOOR as f32);
-    let spread = variance(model, level, noise_scale) * square(BEHIND_DEVIATIONS as f32);
+    let y = sample.y[k];
+    let floor = sample.variance(k, 0.0) * square(LIT_ABOVE_FLOOR as f32);
+    let spread = sample.variance(k, level) * square(BEHIND_DEVIATIONS as f32);
     let beyond = -(predicted + BEHIND_LEVEL as f32 * level);
     let arrives = (y > 0.0) & (square(y) > floor);
     let behind = (beyond > 0.0) & (square(beyond) > spread);
@@ -91,25 +76,21 @@ fn is_lit(model: VarianceModel, predicted: f32, y: f32, level: f32, noise_scale:
 }
 
 impl Sums {
+    /// Sums over no light.
     #[inline(always)]
-    fn add(&mut self, [lx, ly, lz]: &[Lanes; 3], weight: &Lanes, residual: &Lanes) {
-        let [xx, xy, xz, yy, yz, zz] = &mut self.matrix;
-        let [x, y, z] = &mut self.right;
+    pub(crate) fn none() -> Self {
+        Self { matrix: [ZERO; 6], right: [ZERO; 3] }
+    }
+
+    /// Adds a sample of weight w and residual r.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, light: &[Lanes; 3], weight: &Lanes, residual: &Lanes) {
+        let mut weighted = ZERO;
         for k in 0..LANES {
-            let w = weight[k];
-            let (wx, wy, wz) = (w * lx[k], w * ly[k], w * lz[k]);
-            xx[k] += wx * lx[k];
-            xy[k] += wx * ly[k];
-            xz[k] += wx * lz[k];
-            yy[k] += wy * ly[k];
-            yz[k] += wy * lz[k];
-            zz[k] += wz * lz[k];
-            x[k] += wx * residual[k];
-            y[k] += wy * residual[k];
-            z[k] += wz * residual[k];
-            self.chi_square[k] += w * residual[k] * residual[k];
-            self.count[k] += if w > 0.0 { 1.0 } else { 0.0 };
+            weighted[k] = weight[k] * residual[k];
         }
+        add_square(&mut self.matrix, light, weight);
+        add_product(&mut self.right, light, &weighted);
     }
 
     /// (sum w l l^T)^-1 by LDL^T, and the square of the condition number (an upper bound within a factor of nine). Where
@@ -119,12 +100,14 @@ impl Sums {
         let [xx, xy, xz, yy, yz, zz] = &self.matrix;
         let (mut inverse, mut condition_squared) = ([ZERO; 6], ZERO);
         for k in 0..LANES {
-            let (l21, l31) = (xy[k] / xx[k], xz[k] / xx[k]);
+            let r1 = 1.0 / xx[k];
+            let (l21, l31) = (xy[k] * r1, xz[k] * r1);
             let d2 = yy[k] - l21 * xy[k];
-            let l32 = (yz[k] - l21 * xz[k]) / d2;
+            let r2 = 1.0 / d2;
+            let l32 = (yz[k] - l21 * xz[k]) * r2;
             let d3 = zz[k] - l31 * xz[k] - l32 * l32 * d2;
+            let r3 = 1.0 / d3;
             let m31 = l21 * l32 - l31;
-            let (r1, r2, r3) = (1.0 / xx[k], 1.0 / d2, 1.0 / d3);
             inverse[0][k] = r1 + l21 * l21 * r2 + m31 * m31 * r3;
             inverse[1][k] = -l21 * r2 - m31 * l32 * r3;
             inverse[2][k] = m31 * r3;
@@ -140,6 +123,47 @@ impl Sums {
     }
 }
 
+/// Scalar product of two vectors.
+#[inline(always)]
+pub(crate) fn dot([ax, ay, az]: [f32; 3], [bx, by, bz]: [f32; 3]) -> f32 {
+    az.mul_add(bz, ay.mul_add(by, ax * bx))
+}
+
+/// The signal that `g` predicts under a light.
+#[inline(always)]
+pub(crate) fn predict([lx, ly, lz]: &[Lanes; 3], [gx, gy, gz]: &[Lanes; 3]) -> Lanes {
+    let mut predicted = ZERO;
+    for k in 0..LANES {
+        predicted[k] = dot([lx[k], ly[k], lz[k]], [gx[k], gy[k], gz[k]]);
+    }
+    predicted
+}
+
+/// matrix += w l l^T.
+#[inline(always)]
+pub(crate) fn add_square(matrix: &mut [Lanes; 6], [lx, ly, lz]: &[Lanes; 3], w: &Lanes) {
+    let [xx, xy, xz, yy, yz, zz] = matrix;
+    for k in 0..LANES {
+        let (wx, wy, wz) = (w[k] * lx[k], w[k] * ly[k], w[k] * lz[k]);
+        xx[k] = wx.mul_add(lx[k], xx[k]);
+        xy[k] = wx.mul_add(ly[k], xy[k]);
+        xz[k] = wx.mul_add(lz[k], xz[k]);
+        yy[k] = wy.mul_add(ly[k], yy[k]);
+        yz[k] = wy.mul_add(lz[k], yz[k]);
+        zz[k] = wz.mul_add(lz[k], zz[k]);
+    }
+}
+
+/// right += l v.
+#[inline(always)]
+pub(crate) fn add_product(right: &mut [Lanes; 3], light: &[Lanes; 3], v: &Lanes) {
+    for (right, light) in right.iter_mut().zip(light) {
+        for k in 0..LANES {
+            right[k] = light[k].mul_add(v[k], right[k]);
+        }
+    }
+}
+
 /// Symmetric 3 x 3 times vector.
 #[inline(always)]
 pub(crate) fn times(matrix: &[Lanes; 6], vector: &[Lanes; 3]) -> [Lanes; 3] {
@@ -147,15 +171,16 @@ pub(crate) fn times(matrix: &[Lanes; 6], vector: &[Lanes; 3]) -> [Lanes; 3] {
     let [x, y, z] = vector;
     let mut product = [ZERO; 3];
     for k in 0..LANES {
-        product[0][k] = xx[k] * x[k] + xy[k] * y[k] + xz[k] * z[k];
-        product[1][k] = xy[k] * x[k] + yy[k] * y[k] + yz[k] * z[k];
-        product[2][k] = xz[k] * x[k] + yz[k] * y[k] + zz[k] * z[k];
+        let v = [x[k], y[k], z[k]];
+        product[0][k] = dot([xx[k], xy[k], xz[k]], v);
+        product[1][k] = dot([xy[k], yy[k], yz[k]], v);
+        product[2][k] = dot([xz[k], yz[k], zz[k]], v);
     }
     product
 }
 
 /// Adds the solution of the sums to `g`: returns (sum w l l^T)^-1 and the square of its condition number.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn improve(g: &mut [Lanes; 3], sums: &Sums) -> ([Lanes; 6], Lanes) {
     let (inverse, condition_squared) = sums.inverse();
     let change = times(&inverse, &sums.right);

@@ -15,26 +15,29 @@ pub struct Normalisation {
 
 /// y = (raw - black) x scale, NaN where the sample clips. `raw` and `y` start at an even column of the mosaic and share
 /// their length; what is longer in either is left alone.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub fn normalise_row(raw: &[u16], with: &Normalisation, y: &mut [f32]) {
-    let Normalisation { black, scale, saturation } = *with;
-    let one = |raw: u16, filter: usize| {
-        let y = (f32::from(raw) - black[filter]) * scale[filter];
-        if raw < saturation[filter] { y } else { f32::NAN }
+    let [black, scale] = [with.black, with.scale].map(|of| std::array::from_fn(|k| of[k & 1]));
+    let saturation: [u16; STRIDE] = std::array::from_fn(|k| with.saturation[k & 1]);
+    let one = |raw: u16, k: usize, black: &[f32; STRIDE], scale: &[f32; STRIDE]| {
+        let y = (f32::from(raw) - black[k]) * scale[k];
+        if raw < saturation[k] { y } else { f32::NAN }
     };
-    let pairs = raw.len().min(y.len()) / 2;
-    let (raw_pairs, raw_last) = raw.as_chunks::<2>();
-    let (y_pairs, y_last) = y.as_chunks_mut::<2>();
-    for (y, raw) in y_pairs.iter_mut().zip(raw_pairs) {
-        *y = [one(raw[0], 0), one(raw[1], 1)];
+    let length = raw.len().min(y.len());
+    let (raw, raw_rest) = raw[..length].as_chunks::<STRIDE>();
+    let (y, y_rest) = y[..length].as_chunks_mut::<STRIDE>();
+    for (y, raw) in y.iter_mut().zip(raw) {
+        for k in 0..STRIDE {
+            y[k] = one(raw[k], k, &black, &scale);
+        }
     }
-    if let (Some(y), Some(&raw)) = (y_last.first_mut(), raw_last.first())
-        && y_pairs.len() == pairs
-        && raw_pairs.len() == pairs
-    {
-        *y = one(raw, 0);
+    for (k, (y, &raw)) in y_rest.iter_mut().zip(raw_rest).enumerate() {
+        *y = one(raw, k, &black, &scale);
     }
 }
+
+/// Samples that are normalised side by side.
+const STRIDE: usize = 64;
 
 #[cfg(test)]
 mod tests {

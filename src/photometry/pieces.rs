@@ -1,21 +1,18 @@
-//! A row cut into pieces on which light vectors and pseudo-inverses are linear in the column, as float32 coefficients.
+//! A row cut into pieces on which the light vectors L (n x 3) are linear in the column, with N = (L^T L)^-1 interpolated
+//! linearly, both as float32 coefficients.
 //!
-//! The light vectors L (n x 3) are linear between the field's nodes by contract. Their pseudo-inverse P is not; but with
-//! P0 L0 = P1 L1 = I, the linear mix P(t) = (1 - t) P0 + t P1 gives
-//!
-//!   P(t) L(t) - I = t (1 - t) (P0 - P1) (L1 - L0),
-//!
-//! so the error that the mix makes on a Lambertian photosite is known exactly: it is taken off to first order, and a piece is
-//! halved until what it does to the rest of the samples is small too.
+//! L is linear between the field's nodes by contract, N is not. A piece is halved until I - N L^T L is small in its middle;
+//! one refinement of g = N L^T y on the residual then leaves the square of that, and samples that are not Lambertian
+//! cannot add to it, because L^T of the least-squares residual is zero.
 
 use nalgebra::Matrix3;
 
 use super::reference::inverse_if_conditioned;
 use super::row::FieldRow;
 
-/// Largest error, relative to g, that interpolating pseudo-inverses may make before it is taken off. What remains is its
-/// square, and its like on what is not Lambertian in the samples (at most half of them in effect): 0.0009 degrees.
-const LARGEST_MIX_ERROR: f64 = 3e-5;
+/// Largest norm of I - N L^T L. Least squares keeps its square. A weighted solve starts from the unrefined solution, so its
+/// weights are off by as much, its result by that share of the noise: less than 0.0005 degrees where noise makes half of one.
+const LARGEST_MIX_ERROR: f64 = 1e-3;
 
 /// Pieces are not cut below this many columns; what is still too curved then goes to float64.
 const SHORTEST_PIECE: usize = 8;
@@ -30,7 +27,14 @@ pub(crate) struct Linear {
     pub(crate) per_column: [f32; 3],
 }
 
-/// Columns `start..end`; light i's coefficients stand at `first + i` of [`Pieces::light`] and [`Pieces::inverse`].
+/// A symmetric 3 x 3 matrix (xx, xy, xz, yy, yz, zz) on a piece: value at its start and slope per column.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LinearMatrix {
+    pub(crate) at_start: [f32; 6],
+    pub(crate) per_column: [f32; 6],
+}
+
+/// Columns `start..end`; light i's coefficients stand at `first + i` of [`Pieces::light`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     pub(crate) start: usize,
@@ -38,10 +42,8 @@ pub(crate) struct Piece {
     pub(crate) first: usize,
     /// Whether float32 carries this piece.
     pub(crate) float32: bool,
-    /// 1 / columns between the nodes at its ends.
-    pub(crate) per_column: f32,
-    /// (P0 - P1) (L1 - L0).
-    pub(crate) bend: [[f32; 3]; 3],
+    /// (L^T L)^-1.
+    pub(crate) inverse: LinearMatrix,
 }
 
 /// The pieces of a row. Light vectors are divided by `unit`, a power of two near the longest, so that float32 neither
@@ -50,40 +52,28 @@ pub(crate) struct Piece {
 pub(crate) struct Pieces {
     pub(crate) list: Vec<Piece>,
     pub(crate) light: Vec<Linear>,
-    pub(crate) inverse: Vec<Linear>,
     pub(crate) unit: f64,
-    needs: Needs,
     left: Node,
     right: Node,
 }
 
-/// What a method reads of the pieces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Needs {
-    /// Light vectors alone, which are linear anyway.
-    #[default]
-    Lights,
-    /// Pseudo-inverses too.
-    Inverse,
-}
-
-/// Light vectors and their pseudo-inverse at one column; plain arrays, because a row has a hundred nodes.
+/// Light vectors and (L^T L)^-1 at one column; plain arrays, because a row has a hundred nodes.
 #[derive(Clone, Default)]
 struct Node {
     column: usize,
     light: Vec<[f64; 3]>,
-    inverse: Vec<[f64; 3]>,
+    /// L^T L: xx, xy, xz, yy, yz, zz.
+    squares: [f64; 6],
+    inverse: [f64; 6],
     /// At least the condition number; infinite where the lights lie in a plane.
     condition: f64,
 }
 
 impl Pieces {
     /// Cuts a row of `width` columns.
-    pub(crate) fn cut(&mut self, field: &FieldRow, width: usize, needs: Needs) {
-        self.needs = needs;
+    pub(crate) fn cut(&mut self, field: &FieldRow, width: usize) {
         self.list.clear();
         self.light.clear();
-        self.inverse.clear();
         self.unit = unit_of(field);
         let step = field.step.max(1);
         let mut left = std::mem::take(&mut self.left);
@@ -103,9 +93,7 @@ impl Pieces {
         }
         let conditioned = left.condition.max(right.condition) < FLOAT32_CONDITION;
         let length = right.column - left.column;
-        let bent =
-            |n: Needs| n == Needs::Inverse && mix_error(&bend(left, right)) >= LARGEST_MIX_ERROR;
-        let straight = conditioned && !bent(self.needs);
+        let straight = conditioned && mix_error(left, right) < LARGEST_MIX_ERROR;
         if straight || !conditioned || length < 2 * SHORTEST_PIECE {
             self.push(left, right, width, straight);
             return;
@@ -119,14 +107,16 @@ impl Pieces {
     fn push(&mut self, left: &Node, right: &Node, width: usize, float32: bool) {
         let (start, end) = (left.column, right.column.min(width));
         let per_column = 1.0 / (right.column - left.column) as f64;
-        let bend = bend(left, right).map(|row| row.map(|v| v as f32));
         let first = self.light.len();
-        self.list.push(Piece { start, end, first, float32, per_column: per_column as f32, bend });
-        let between = |a: &[[f64; 3]], b: &[[f64; 3]], to: &mut Vec<Linear>| {
-            to.extend(a.iter().zip(b).map(|(a, b)| Linear::between(a, b, per_column)));
+        let inverse = LinearMatrix {
+            at_start: left.inverse.map(|v| v as f32),
+            per_column: std::array::from_fn(|i| {
+                ((right.inverse[i] - left.inverse[i]) * per_column) as f32
+            }),
         };
-        between(&left.light, &right.light, &mut self.light);
-        between(&left.inverse, &right.inverse, &mut self.inverse);
+        self.list.push(Piece { start, end, first, float32, inverse });
+        let lights = left.light.iter().zip(&right.light);
+        self.light.extend(lights.map(|(a, b)| Linear::between(a, b, per_column)));
     }
 }
 
@@ -142,49 +132,51 @@ impl Node {
     fn place(&mut self, field: &FieldRow, column: usize, unit: f64) {
         self.column = column;
         field.copy_at(column, 1.0 / unit, &mut self.light);
-        let mut sums = [0.0; 6];
-        for &[x, y, z] in &self.light {
-            for (sum, product) in sums.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
-                *sum += product;
-            }
-        }
-        let [xx, xy, xz, yy, yz, zz] = sums;
+        self.square();
+        let [xx, xy, xz, yy, yz, zz] = self.squares;
         let inverse = inverse_if_conditioned(&Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz));
         self.condition =
             inverse.map_or(f64::INFINITY, |inverse| ((xx + yy + zz) * inverse.trace()).sqrt());
         let inverse = inverse.unwrap_or_default();
-        let rows: [[f64; 3]; 3] =
-            [0, 1, 2].map(|r| [inverse[(r, 0)], inverse[(r, 1)], inverse[(r, 2)]]);
-        self.inverse.clear();
-        self.inverse.extend(
-            self.light.iter().map(|[x, y, z]| rows.map(|r| r[0] * x + r[1] * y + r[2] * z)),
-        );
+        self.inverse = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|place| inverse[place]);
     }
-}
 
-/// (P0 - P1) (L1 - L0), see the head of this file.
-fn bend(left: &Node, right: &Node) -> [[f64; 3]; 3] {
-    let mut bend = [[0.0; 3]; 3];
-    let lights = left.light.iter().zip(&right.light);
-    for ((p0, p1), (l0, l1)) in left.inverse.iter().zip(&right.inverse).zip(lights) {
-        for row in 0..3 {
-            for column in 0..3 {
-                bend[row][column] += (p0[row] - p1[row]) * (l1[column] - l0[column]);
+    fn square(&mut self) {
+        self.squares = [0.0; 6];
+        for &[x, y, z] in &self.light {
+            for (sum, product) in
+                self.squares.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z])
+            {
+                *sum += product;
             }
         }
     }
-    bend
 }
 
-/// Norm of the mix's error in the middle of a piece.
-fn mix_error(bend: &[[f64; 3]; 3]) -> f64 {
-    bend.iter().flatten().map(|e| e * e).sum::<f64>().sqrt() / 4.0
+/// At least the norm of I - N L^T L in the middle, N being the mean of those at the ends. With M = L^T L, and as L is linear,
+/// I - N M = (N (L1 - L0)^T (L1 - L0) - (N0 - N1) (M1 - M0)) / 4.
+fn mix_error(left: &Node, right: &Node) -> f64 {
+    let norm = |entry: &dyn Fn(usize) -> f64| {
+        let weights = [1.0, 2.0, 2.0, 1.0, 2.0, 1.0].into_iter().enumerate();
+        weights.map(|(i, weight)| weight * entry(i).powi(2)).sum::<f64>().sqrt()
+    };
+    let inverses = norm(&|i| 0.5 * (left.inverse[i] + right.inverse[i]));
+    let inverse_change = norm(&|i| right.inverse[i] - left.inverse[i]);
+    let squares_change = norm(&|i| right.squares[i] - left.squares[i]);
+    let lights = left.light.iter().zip(&right.light);
+    let light_change: f64 = lights
+        .map(|(a, b)| (b[0] - a[0]).powi(2) + (b[1] - a[1]).powi(2) + (b[2] - a[2]).powi(2))
+        .sum();
+    0.25 * (inverses * light_change + inverse_change * squares_change)
 }
 
-/// The power of two at or below the longest component; 1 for a field without a finite non-zero number.
+/// The power of two at or below the longest component at the row's ends; 1 without a finite non-zero number there. (Somewhere
+/// else it may be much longer: what float32 does not carry then goes to float64.)
 fn unit_of(field: &FieldRow) -> f64 {
-    let components = field.vectors.iter().flatten();
-    let longest = components
+    let ends = field.vectors.len().saturating_sub(field.lights);
+    let of_ends = field.vectors.iter().take(field.lights).chain(&field.vectors[ends..]);
+    let longest = of_ends
+        .flatten()
         .fold(0.0_f64, |longest, c| if c.is_finite() { longest.max(c.abs()) } else { longest });
     if longest > 0.0 { longest.log2().floor().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
 }

@@ -135,8 +135,12 @@ impl Samples<'_> {
         Some(Solution { g: inverse * right, inverse, weights })
     }
 
-    /// Weighted solution; `plain` is the solution with every usable sample.
+    /// Weighted solution; `plain` is the solution with every usable sample. Where all samples are there, noise explains the
+    /// solution with all of them, and every light stands in front of the surface, that is it.
     fn weighted(&self, usable: &[bool; MAX_LIGHTS], plain: Solution) -> Solution {
+        if let Some(solution) = self.weighted_with_all(usable, &plain) {
+            return solution;
+        }
         let mut solution = self.solve(equal_weights(&self.bright(usable))).unwrap_or(plain);
         for _ in 0..REWEIGHTINGS {
             let lit = self.weights_at(&solution.g, usable, true);
@@ -175,6 +179,17 @@ impl Samples<'_> {
     /// Least variance that counts.
     pub(crate) fn least_variance(&self) -> f64 {
         (RELATIVE_FLOOR * self.level()).powi(2).max(f64::MIN_POSITIVE)
+    }
+
+    /// The weighted solution with every sample, reweighted once after the plain one.
+    fn weighted_with_all(&self, usable: &[bool; MAX_LIGHTS], plain: &Solution) -> Option<Solution> {
+        let n = self.y.len();
+        let in_front = self.lights.iter().all(|l| plain.g.dot(l) > 0.0);
+        if !in_front || !usable[..n].iter().all(|&usable| usable) {
+            return None;
+        }
+        let solution = self.solve(self.weights_at(&plain.g, usable, false))?;
+        self.fits(&solution).then_some(solution)
     }
 
     /// Samples for the plain start: those near the photosite's own level, or all where these are too few.

@@ -4,9 +4,9 @@
 
 use multiversion::multiversion;
 
-use super::block::{Block, LANES, Lanes, ZERO};
+use super::block::{Block, LANES, Lanes, ZERO, larger};
 use super::method::{DARK_SHARE, MAX_LIGHTS, MOST_LIGHTS_EXACT, SEARCH_SAMPLES};
-use super::normal_equations::{Weighting, accumulate, improve, variance};
+use super::normal_equations::{Weighting, accumulate, improve};
 use super::row::Outcome;
 use super::subset::{SubsetSearch, WIDE, Whitened, best_subset};
 use super::tighten::tighten;
@@ -59,7 +59,7 @@ impl RobustSolver {
 }
 
 /// 1 / var at the median sample; samples in shadow are set aside.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn first_weights(block: &mut Block, median: &Lanes) {
     let least = block.least_variance();
     let mut bright = ZERO;
@@ -70,10 +70,8 @@ fn first_weights(block: &mut Block, median: &Lanes) {
         }
     }
     for sample in &mut block.sample {
-        let [even, odd] = sample.variance;
         for k in 0..LANES {
-            let model = if block.odd[k] == 0 { even } else { odd };
-            let variance = variance(model, median[k], block.noise_scale[k]).max(least[k]);
+            let variance = larger(sample.variance(k, median[k]), least[k]);
             let few = bright[k] < SEARCH_SAMPLES as f32;
             let counts = few | (sample.y[k] > DARK_SHARE as f32 * median[k]);
             sample.weight[k] = if counts { sample.usable[k] / variance } else { 0.0 };

@@ -50,6 +50,10 @@ impl FieldRow<'_> {
         let of_node = |node: usize| &self.vectors[node.min(last) * self.lights..][..self.lights];
         let (a, b) = (of_node(node), of_node(node + 1));
         to.clear();
+        if t == 0.0 {
+            to.extend(a.iter().map(|a| a.map(|component| component * factor)));
+            return;
+        }
         to.extend(
             a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|c| (a[c] + (b[c] - a[c]) * t) * factor)),
         );

@@ -1,16 +1,17 @@
 //! The fast path of a row: blocks of neighbours first, then those photosites that need more.
 
-use std::ops::Range;
-
 use multiversion::multiversion;
+use pulp::Arch;
 
-use super::block::{Block, LANES, Place};
-use super::least_squares::{solve_complete, solve_masked};
-use super::method::Method;
-use super::pieces::{Needs, Pieces};
+use super::block::{Block, LANES, Lanes, Place, ZERO};
+use super::complete::{LeastSquares, Neighbours, Weighted};
+use super::least_squares::solve_masked;
+use super::method::{MOST_LENGTHENING, Method};
+use super::pieces::Pieces;
 use super::reference::solve_column;
 use super::robust::RobustSolver;
 use super::row::{Outcome, RowError, RowInput, RowOutput, check_shapes};
+use super::surface::Surface;
 use super::weighted::solve_weighted;
 
 /// Solves rows; keeps its buffers from one row to the next. One for every thread.
@@ -18,6 +19,9 @@ use super::weighted::solve_weighted;
 pub struct RowSolver {
     pieces: Pieces,
     block: Block,
+    surface: Surface,
+    weights: Vec<Lanes>,
+    arch: Arch,
     robust: RobustSolver,
     queues: Queues,
 }
@@ -25,11 +29,10 @@ pub struct RowSolver {
 /// Photosites that wait for a slower path.
 #[derive(Default)]
 struct Queues {
-    /// Samples missing.
-    masked: Vec<Place>,
+    /// Samples missing, or too little explained by what suffices for most.
+    apart: Vec<Place>,
     /// Residual too large, where that is tested.
     suspect: Vec<Place>,
-    test: bool,
     /// Beyond float32.
     deferred: Vec<usize>,
 }
@@ -55,31 +58,25 @@ impl RowSolver {
         if output.outcome.is_empty() {
             return Ok(());
         }
-        let needs = if method == Method::LeastSquares { Needs::Inverse } else { Needs::Lights };
-        self.pieces.cut(&input.field, output.outcome.len(), needs);
+        self.pieces.cut(&input.field, output.outcome.len());
         self.block.reset(input);
-        self.queues.masked.clear();
+        self.weights.resize(input.field.lights, ZERO);
+        self.queues.apart.clear();
         self.queues.suspect.clear();
-        self.queues.test = method == Method::Auto;
         self.queues.deferred.clear();
         for index in 0..self.pieces.list.len() {
             let piece = self.pieces.list[index];
+            let columns = piece.start..piece.end;
             match method {
-                _ if !piece.float32 => self.queues.deferred.extend(piece.start..piece.end),
-                Method::LeastSquares => {
-                    self.neighbours(index, input, output, least_squares_of_block);
-                }
-                Method::Weighted | Method::Auto => {
-                    self.neighbours(index, input, output, weighted_of_block);
-                }
+                _ if !piece.float32 => self.queues.deferred.extend(columns),
                 Method::Robust => {
-                    self.queues.suspect.extend(
-                        (piece.start..piece.end).map(|column| Place { column, piece: index }),
-                    );
+                    let places = columns.map(|column| Place { column, piece: index });
+                    self.queues.suspect.extend(places);
                 }
+                _ => self.neighbours(index, input, output, method),
             }
         }
-        self.masked(input, output);
+        self.apart(input, output, method);
         self.suspects(input, output);
         for &column in &self.queues.deferred {
             let pixel = solve_column(input, column, method);
@@ -94,141 +91,154 @@ impl RowSolver {
         index: usize,
         input: &RowInput,
         output: &mut RowOutput,
-        solve: BlockSolve,
+        method: Method,
     ) {
         let piece = &self.pieces.list[index];
         for start in (piece.start..piece.end).step_by(LANES) {
-            let len = LANES.min(piece.end - start);
-            solve(
-                &mut self.block,
-                &self.pieces,
-                index,
-                start..start + len,
-                input,
-                output,
-                &mut self.queues,
-            );
+            let columns = start..piece.end.min(start + LANES);
+            self.block.place(input, &columns);
+            let at = Neighbours { block: &self.block, pieces: &self.pieces, piece, input };
+            let surface = &mut self.surface;
+            match method {
+                Method::LeastSquares => {
+                    surface.most_lengthening = 0.0;
+                    self.arch.dispatch(LeastSquares { at, surface });
+                }
+                _ => {
+                    surface.most_lengthening = MOST_LENGTHENING as f32;
+                    self.arch.dispatch(Weighted { at, surface, weights: &mut self.weights });
+                }
+            }
+            write_or_refuse(&mut self.block, surface, self.pieces.unit, output);
+            for k in 0..self.block.refused.len() {
+                self.queues.refuse(self.block.refused[k], index, input, output);
+            }
         }
     }
 
-    /// Least squares of photosites with samples missing.
-    fn masked(&mut self, input: &RowInput, output: &mut RowOutput) {
-        for places in self.queues.masked.chunks(LANES) {
-            self.block.gather(input, &self.pieces, places);
-            masked_of_block(&mut self.block, self.pieces.unit, output, &mut self.queues.deferred);
+    /// Photosites by normal equations of their own.
+    fn apart(&mut self, input: &RowInput, output: &mut RowOutput, method: Method) {
+        for places in self.queues.apart.chunks(LANES) {
+            let (block, pieces) = (&mut self.block, &self.pieces);
+            let deferred = &mut self.queues.deferred;
+            match method {
+                Method::LeastSquares => {
+                    least_squares_apart(block, pieces, places, input, output, deferred);
+                }
+                _ => {
+                    let suspect = (method == Method::Auto).then_some(&mut self.queues.suspect);
+                    weighted_apart(block, pieces, places, input, output, (suspect, deferred));
+                }
+            }
         }
     }
-}
 
-impl RowSolver {
     /// The subset test for those that ask for it.
     fn suspects(&mut self, input: &RowInput, output: &mut RowOutput) {
         for places in self.queues.suspect.chunks(LANES) {
-            self.block.gather(input, &self.pieces, places);
-            let unit = self.pieces.unit;
-            robust_of_block(
-                &mut self.block,
-                &mut self.robust,
-                unit,
-                output,
-                &mut self.queues.deferred,
-            );
+            let (block, robust, pieces) = (&mut self.block, &mut self.robust, &self.pieces);
+            let deferred = &mut self.queues.deferred;
+            robust_of_block(block, robust, pieces, places, input, output, deferred);
         }
     }
 }
 
-/// Solves the columns of a range, which lie on one piece.
-type BlockSolve =
-    fn(&mut Block, &Pieces, usize, Range<usize>, &RowInput, &mut RowOutput, &mut Queues);
+impl Queues {
+    /// A photosite that its neighbours' way has not solved.
+    fn refuse(&mut self, column: usize, piece: usize, input: &RowInput, output: &mut RowOutput) {
+        let dark = |y: &&[f32]| y[column] == 0.0 || !y[column].is_finite();
+        if usable_samples(input, column) < 3 {
+            output.clear(column, Outcome::TooFewLights);
+        } else if input.signal.iter().all(dark) {
+            output.clear(column, Outcome::NoSurface);
+        } else {
+            self.apart.push(Place { column, piece });
+        }
+    }
+}
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn least_squares_of_block(
+/// Writes a surface of neighbours and notes which columns it does not carry.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn write_or_refuse(block: &mut Block, surface: &Surface, unit: f64, output: &mut RowOutput) {
+    let mut refused = std::mem::take(&mut block.refused);
+    refused.clear();
+    surface.write(block, unit, output, |k, _| refused.push(block.column[k]));
+    block.refused = refused;
+}
+
+/// Samples that a column can use.
+fn usable_samples(input: &RowInput, column: usize) -> usize {
+    input.signal.iter().filter(|y| y[column].is_finite()).count()
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn least_squares_apart(
     block: &mut Block,
     pieces: &Pieces,
-    piece: usize,
-    columns: Range<usize>,
+    places: &[Place],
     input: &RowInput,
-    output: &mut RowOutput,
-    queues: &mut Queues,
-) {
-    block.load(input, pieces, &pieces.list[piece], columns);
-    if block.is_dark() {
-        return dark(block, output);
-    }
-    if output.kept.is_some() {
-        block.weigh_equally();
-    }
-    let surface = solve_complete(block, pieces, &pieces.list[piece]);
-    surface.write(block, pieces.unit, output, |k, output| {
-        let column = block.column[k];
-        match block.usable_samples(k) {
-            0..3 => output.clear(column, Outcome::TooFewLights),
-            all if all == block.sample.len() => queues.deferred.push(column),
-            _ => queues.masked.push(Place { column, piece }),
-        }
-    });
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn masked_of_block(
-    block: &mut Block,
-    unit: f64,
     output: &mut RowOutput,
     deferred: &mut Vec<usize>,
 ) {
+    block.gather(input, pieces, places);
     let surface = solve_masked(block);
-    surface.write(block, unit, output, |k, _| deferred.push(block.column[k]));
+    surface.write(block, pieces.unit, output, |k, _| deferred.push(block.column[k]));
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
-fn weighted_of_block(
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn weighted_apart(
     block: &mut Block,
     pieces: &Pieces,
-    piece: usize,
-    columns: Range<usize>,
+    places: &[Place],
     input: &RowInput,
     output: &mut RowOutput,
-    queues: &mut Queues,
+    (suspects, deferred): (Option<&mut Vec<Place>>, &mut Vec<usize>),
 ) {
-    block.load(input, pieces, &pieces.list[piece], columns);
-    if block.is_dark() {
-        return dark(block, output);
-    }
+    block.gather(input, pieces, places);
     let mut solved = solve_weighted(block);
-    let mut suspect = [false; LANES];
-    for k in 0..LANES {
-        suspect[k] = queues.test && solved.surface.carried[k] && solved.is_suspect(k);
-        solved.surface.carried[k] &= !suspect[k];
+    let mut withdrawn = [false; LANES];
+    if let Some(suspects) = suspects {
+        for k in 0..block.len {
+            withdrawn[k] = solved.surface.carried[k] && solved.is_suspect(k);
+            if withdrawn[k] {
+                suspects.push(places[k]);
+                solved.surface.carried[k] = false;
+            }
+        }
     }
-    solved.surface.write(block, pieces.unit, output, |k, output| {
-        if suspect[k] {
-            queues.suspect.push(Place { column: block.column[k], piece });
-        } else {
-            defer(block, k, output, &mut queues.deferred);
+    solved.surface.write(block, pieces.unit, output, |k, _| {
+        if !withdrawn[k] {
+            deferred.push(block.column[k]);
         }
     });
 }
 
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn robust_of_block(
     block: &mut Block,
     robust: &mut RobustSolver,
-    unit: f64,
+    pieces: &Pieces,
+    places: &[Place],
+    input: &RowInput,
     output: &mut RowOutput,
     deferred: &mut Vec<usize>,
 ) {
+    block.gather(input, pieces, places);
     if block.is_dark() {
         return dark(block, output);
     }
     let solved = robust.solve(block);
-    solved.surface.write(block, unit, output, |k, output| defer(block, k, output, deferred));
+    let unit = pieces.unit;
+    solved.surface.write(block, unit, output, |k, output| {
+        defer(input, block.column[k], output, deferred);
+    });
 }
 
 /// Sends a photosite to float64 unless it is clear without that nothing can be solved.
-fn defer(block: &Block, k: usize, output: &mut RowOutput, deferred: &mut Vec<usize>) {
-    match block.usable_samples(k) {
-        0..3 => output.clear(block.column[k], Outcome::TooFewLights),
-        _ => deferred.push(block.column[k]),
+fn defer(input: &RowInput, column: usize, output: &mut RowOutput, deferred: &mut Vec<usize>) {
+    match usable_samples(input, column) {
+        0..3 => output.clear(column, Outcome::TooFewLights),
+        _ => deferred.push(column),
     }
 }
 

@@ -157,21 +157,38 @@ pub(crate) fn wide_times(matrix: &[Wide; 6], [x, y, z]: &[Wide; 3]) -> [Wide; 3]
     product
 }
 
-/// Per photosite the set of lights (bit i for light i) whose drop minimises RSS + 12 |K|.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+/// Per photosite the set of lights (bit i for light i) whose drop minimises RSS + 12 |K|. Smaller sets come first: once all
+/// photosites have a cost that the penalty of the next larger sets alone exceeds, these cannot be better.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn best_subset(search: &mut SubsetSearch, samples: &Whitened) -> [u64; WIDE] {
     let n = samples.y.len();
     search.none.fit(samples);
     let mut best = Best::new(&samples.count);
     best.consider(0, 0, &search.none.rss, &search.none.determinant);
+    if best.is_settled(1) {
+        return best.dropped;
+    }
+    for i in 0..n {
+        search.none.consider_two(n, i, (1, 1 << i), &mut best);
+    }
+    if best.is_settled(3) {
+        return best.dropped;
+    }
     for i in 0..n {
         search.one.drop(&search.none, n, i);
-        best.consider(1, 1 << i, &search.one.rss, &search.one.determinant);
+        for j in i + 1..n {
+            search.one.consider_two(n, j, (2, 1 << i | 1 << j), &mut best);
+        }
+    }
+    if best.is_settled(4) {
+        return best.dropped;
+    }
+    for i in 0..n {
+        search.one.drop(&search.none, n, i);
         for j in i + 1..n {
             search.two.drop(&search.one, n, j);
-            best.consider(2, 1 << i | 1 << j, &search.two.rss, &search.two.determinant);
             for k in j + 1..n {
-                search.two.drop_last_two(n, k, 1 << i | 1 << j | 1 << k, &mut best);
+                search.two.consider_two(n, k, (3, 1 << i | 1 << j | 1 << k), &mut best);
             }
         }
     }
@@ -237,9 +254,9 @@ impl State {
         }
     }
 
-    /// Considers dropping `i` and then each one of the lights after it.
+    /// Considers dropping `i`, which makes a set of `drops`, and then each one of the lights after it.
     #[inline(always)]
-    fn drop_last_two(&self, n: usize, i: usize, set: u64, best: &mut Best) {
+    fn consider_two(&self, n: usize, i: usize, (drops, set): (usize, u64), best: &mut Best) {
         let (own, r) = (&self.hat[i * n + i], &self.residual[i]);
         let (mut inverse, mut rss, mut determinant) = (WIDE_ZERO, WIDE_ZERO, WIDE_ZERO);
         for k in 0..WIDE {
@@ -248,7 +265,7 @@ impl State {
             rss[k] = self.rss[k] - r[k] * r[k] * inverse[k];
             determinant[k] = self.determinant[k] * left;
         }
-        best.consider(3, set, &rss, &determinant);
+        best.consider(drops, set, &rss, &determinant);
         for j in i + 1..n {
             let (across, own, rj) = (&self.hat[i * n + j], &self.hat[j * n + j], &self.residual[j]);
             let (mut last_rss, mut last_determinant) = (WIDE_ZERO, WIDE_ZERO);
@@ -259,7 +276,7 @@ impl State {
                 last_rss[k] = rss[k] - residual * residual / left;
                 last_determinant[k] = determinant[k] * left;
             }
-            best.consider(4, set | 1 << j, &last_rss, &last_determinant);
+            best.consider(drops + 1, set | 1 << j, &last_rss, &last_determinant);
         }
     }
 }
@@ -275,6 +292,16 @@ impl Best {
             }
         }
         Self { cost: [f64::INFINITY; WIDE], dropped: [0; WIDE], penalty }
+    }
+
+    /// Whether no set of at least so many drops can be better for any photosite.
+    #[inline(always)]
+    fn is_settled(&self, drops: usize) -> bool {
+        let mut settled = true;
+        for k in 0..WIDE {
+            settled &= self.cost[k] <= DROP_PENALTY * drops as f64;
+        }
+        settled
     }
 
     #[inline(always)]

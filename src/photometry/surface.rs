@@ -17,11 +17,17 @@ pub(crate) struct Surface {
     /// What the subset test says of a solved photosite.
     pub(crate) outcome: [Outcome; LANES],
     /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
-    most_lengthening: f32,
+    pub(crate) most_lengthening: f32,
 }
 
 /// |g|^2 outside this range may have lost bits to underflow or overflow: float64 takes over.
 const COMFORTABLE: std::ops::Range<f32> = 1e-24..1e24;
+
+impl Default for Surface {
+    fn default() -> Self {
+        Self::new([ZERO; 3], 0.0)
+    }
+}
 
 impl Surface {
     /// A solution of which nothing is known yet.

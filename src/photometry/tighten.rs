@@ -57,7 +57,7 @@ pub(crate) fn tightened_weight(square: f64, mu: f64) -> f64 {
 }
 
 /// Per photosite the set of lights (bit i for light i) that remain outside when the cost has been tightened.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn tighten(samples: &Whitened) -> [u64; WIDE] {
     let sums = samples.sums(|i| samples.used[i]);
     let mut g = wide_times(&sums.inverse(), &sums.right);

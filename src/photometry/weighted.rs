@@ -1,14 +1,14 @@
-//! Weighted least squares of a block, with lights behind the surface left out.
+//! Weighted least squares of photosites from anywhere in a row, with lights behind the surface left out.
 
 use multiversion::multiversion;
 
-use super::block::{Block, LANES, ZERO};
-use super::method::{MOST_LENGTHENING, REWEIGHTINGS, START_LEVEL, chi_square_limit};
-use super::normal_equations::{Weighting, accumulate, improve, times};
+use super::block::{Block, LANES, Lanes, ZERO};
+use super::method::{MOST_LENGTHENING, START_LEVEL, chi_square_limit};
+use super::normal_equations::{Weighting, accumulate, dot, improve, times};
 use super::surface::Surface;
 
 /// Normal equations only correct an earlier fit here, so a larger condition is carried than where they make it.
-const WEIGHTED_CONDITION_SQUARED: f32 = 1e4;
+pub(crate) const WEIGHTED_CONDITION_SQUARED: f32 = 1e4;
 
 /// A block's weighted solution and its chi-square.
 pub(crate) struct Weighted {
@@ -28,28 +28,25 @@ impl Weighted {
     }
 
     /// Whether lane `k` asks for the subset test.
-    #[inline(always)]
     pub(crate) fn is_suspect(&self, k: usize) -> bool {
         self.overlooked[k] > 0.0 || !self.fits(k)
     }
 }
 
-/// Plain start, then reweighted solves.
+/// A plain start from the bright samples, then two reweighted solves.
 pub(crate) fn solve_weighted(block: &mut Block) -> Weighted {
     let mut g = [ZERO; 3];
     let start = accumulate(block, &g, Weighting::Bright);
     improve(&mut g, &start);
-    for _ in 1..REWEIGHTINGS {
-        let sums = accumulate(block, &g, Weighting::Noise);
-        improve(&mut g, &sums);
-    }
+    let sums = accumulate(block, &g, Weighting::Noise);
+    improve(&mut g, &sums);
     let sums = accumulate(block, &g, Weighting::Noise);
     let (inverse, condition_squared) = improve(&mut g, &sums);
     finish(block, &g, &inverse, &condition_squared)
 }
 
 /// Residuals at the last solution with the weights that it was solved with.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(crate) fn finish(
     block: &Block,
     g: &[[f32; LANES]; 3],
@@ -62,22 +59,33 @@ pub(crate) fn finish(
     for sample in &block.sample {
         let [lx, ly, lz] = &sample.light;
         for k in 0..LANES {
-            let residual = sample.y[k] - (lx[k] * gx[k] + ly[k] * gy[k] + lz[k] * gz[k]);
+            let residual = sample.y[k] - dot([lx[k], ly[k], lz[k]], [gx[k], gy[k], gz[k]]);
             let w = sample.weight[k];
-            let used = if w > 0.0 { 1.0 } else { 0.0 };
-            chi_square[k] += w * residual * residual;
-            surface.squares[k] += used * residual * residual;
+            let used: f32 = if w > 0.0 { 1.0 } else { 0.0 };
+            let square = residual * residual;
+            chi_square[k] = w.mul_add(square, chi_square[k]);
+            surface.squares[k] = used.mul_add(square, surface.squares[k]);
             surface.count[k] += used;
             let seen = sample.y[k] > START_LEVEL as f32 * block.level[k];
             overlooked[k] += if seen & (w == 0.0) { sample.usable[k] } else { 0.0 };
         }
     }
+    covariance_across(&mut surface, inverse, condition_squared);
+    Weighted { surface, chi_square, overlooked }
+}
+
+/// Notes the covariance across the normal, and whether float32 carries the lights' condition.
+#[inline(always)]
+pub(crate) fn covariance_across(
+    surface: &mut Surface,
+    inverse: &[Lanes; 6],
+    condition_squared: &Lanes,
+) {
     let (normal, _) = surface.normal_and_length();
     let [px, py, pz] = &times(inverse, &normal);
     for k in 0..LANES {
-        let along = px[k] * normal[0][k] + py[k] * normal[1][k] + pz[k] * normal[2][k];
+        let along = dot([px[k], py[k], pz[k]], [normal[0][k], normal[1][k], normal[2][k]]);
         surface.tangent_variance[k] = inverse[0][k] + inverse[3][k] + inverse[5][k] - along;
         surface.carried[k] = condition_squared[k] < WEIGHTED_CONDITION_SQUARED;
     }
-    Weighted { surface, chi_square, overlooked }
 }
