@@ -5,6 +5,7 @@
 # make soak    light board and host for fifteen minutes over a bad wire
 # make kills   the program killed two hundred times while it scans, at the simulated board
 # make scan-timing   wall time of a scan of full-size frames beside exposure and transfer
+# make tether-timing the same through libgphoto2, with a camera that speaks PTP/IP
 # make bench   run time against error and against touching the bytes once
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
@@ -17,7 +18,7 @@ TETHER_PACKAGES := pkg-config clang libclang-dev libgphoto2-dev
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
-.PHONY: demo test build bench soak kills scan-timing firmware packages-demo packages-all packages-firmware
+.PHONY: demo test build bench soak kills scan-timing tether-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -60,3 +61,6 @@ kills: packages-all firmware
 
 scan-timing: packages-all firmware
 	cargo test --locked --release --test scan -- --ignored --nocapture ten_full_size_frames
+
+tether-timing: packages-all firmware
+	cargo test --locked --release -p weavelight-tether --all-features --test camera -- --ignored --nocapture ten_full_size_frames

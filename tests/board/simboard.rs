@@ -13,7 +13,10 @@ pub(crate) const BOOTLOADER: &str =
     "/usr/share/arduino/hardware/arduino/avr/bootloaders/optiboot/optiboot_atmega328.hex";
 
 fn firmware_folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("firmware")
+    // Also from a package in a folder of the workspace.
+    let folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
+    let mut firmware = folders.map(|folder| folder.join("firmware"));
+    firmware.find(|firmware| firmware.is_dir()).unwrap()
 }
 
 /// Builds firmware and simulated board, or says what is missing.

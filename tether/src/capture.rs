@@ -43,7 +43,6 @@ pub(crate) fn capture(
     outlet: &mut Outlet,
 ) -> Result<Captured, Fault> {
     drop_stale(camera)?;
-    outlet.moment(Moment::ShutterOpens);
     let start = Instant::now();
     told(camera.held.trigger_capture().wait(), Doing::Using)?;
     // Most cameras are busy until the shutter has closed; some return at once.

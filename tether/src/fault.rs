@@ -102,11 +102,14 @@ fn code_in(line: &str) -> Option<u16> {
     u16::from_str_radix(&digits[..end], 16).ok()
 }
 
+/// In the camera's words where it said some: `PTP General Error (0x2002)`.
 fn reason(text: &str, recent: &VecDeque<String>) -> String {
-    match recent.back() {
-        Some(line) => format!("{text}: {}", line.trim()),
-        None => text.to_owned(),
-    }
+    let line = recent.iter().rev().find(|line| code_in(line).is_some());
+    let words = |line: &String| match line.rsplit_once("failed: ") {
+        Some((_, words)) => words.trim().replace('\'', ""),
+        None => format!("{text}, code {:04X}", code_in(line).unwrap_or_default()),
+    };
+    line.map_or_else(|| text.to_owned(), words)
 }
 
 #[cfg(test)]
@@ -147,6 +150,16 @@ mod tests {
             Fault::Asleep,
         );
         using(ErrorKind::IoRead, &[], Fault::LinkCut);
+        using(
+            ErrorKind::Other,
+            &["'ptp_getobject (params)' failed: 'PTP General Error' (0x2002)", "failed: -1"],
+            Fault::Other { reason: "PTP General Error (0x2002)".into() },
+        );
+        using(
+            ErrorKind::Other,
+            &["PTPIP_CMD_RESPONSE (result=0xa004, tid=0x1)"],
+            Fault::Other { reason: "Unspecified error, code A004".into() },
+        );
         using(ErrorKind::Other, &[], Fault::Other { reason: "Unspecified error".into() });
         let opening = |kind, lines, expected| check(kind, Doing::Opening, lines, expected);
         opening(ErrorKind::Io, &[], Fault::NoCamera);

@@ -93,6 +93,19 @@ fn a_camera_that_cannot_be_had_is_named_as_such() {
 }
 
 #[test]
+fn a_camera_that_the_helper_of_a_killed_scan_still_holds_is_waited_for() {
+    let bench = Bench::new();
+    bench.camera.fail(Fault::Claimed);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            std::thread::sleep(Duration::from_secs(1));
+            bench.camera.repair();
+        });
+        bench.open().unwrap();
+    });
+}
+
+#[test]
 fn no_camera() {
     let mut tether = Bench::new().tether();
     // Nobody listens where the camera was.

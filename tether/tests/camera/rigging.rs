@@ -9,6 +9,17 @@ use weavelight::device::camera::{Applied, Camera, CameraError, Settings, Shutter
 /// Long enough to be an exposure, short enough for a test.
 pub(crate) const SETTINGS: Settings = Settings { exposure_s: 0.02, iso: 100.0 };
 
+/// As the program reaches a camera, but with less patience.
+pub(crate) fn tether_to(camera: &FakeCamera, home: &Path) -> Tether {
+    Tether {
+        helper: Path::new(env!("CARGO_BIN_EXE_weavelight-tether")).to_owned(),
+        home: home.to_owned(),
+        patience: Duration::from_secs(20),
+        picture_within: Duration::from_secs(1),
+        ..Tether::new(Some(camera.port()))
+    }
+}
+
 /// A camera, a folder for frames, and one in place of the user's home.
 pub(crate) struct Bench {
     pub(crate) camera: FakeCamera,
@@ -34,15 +45,8 @@ impl Bench {
         self.folder.path().join("home")
     }
 
-    /// As the program reaches it, but with less patience.
     pub(crate) fn tether(&self) -> Tether {
-        Tether {
-            helper: Path::new(env!("CARGO_BIN_EXE_weavelight-tether")).to_owned(),
-            home: self.home(),
-            patience: Duration::from_secs(20),
-            picture_within: Duration::from_secs(1),
-            ..Tether::new(Some(self.camera.port()))
-        }
+        tether_to(&self.camera, &self.home())
     }
 
     pub(crate) fn open(&self) -> Result<TetheredCamera, CameraError> {

@@ -1,9 +1,8 @@
 //! From what the helper says to the errors of a camera.
 
 use super::helper::CallError;
-use super::holders::holder;
 use super::protocol::Fault;
-use crate::device::camera::CameraError;
+use crate::device::camera::{CameraError, usb_cameras};
 use crate::files::FileError;
 use std::io;
 use std::path::PathBuf;
@@ -47,7 +46,9 @@ fn of_fault(fault: Fault, picture_within: Duration) -> CameraError {
             ))
         }
         Fault::Asleep => CameraError::Asleep,
-        Fault::Claimed => CameraError::Claimed { by: holder() },
+        Fault::Claimed => {
+            CameraError::Claimed { by: usb_cameras().into_iter().find_map(|camera| camera.held_by) }
+        }
         Fault::Permission => CameraError::Permission,
         Fault::Dial { mode } => CameraError::WrongMode { mode },
         Fault::NotOffered { setting, wanted, offered } => {

@@ -5,7 +5,6 @@
 mod diagnose;
 mod fault;
 mod helper;
-mod holders;
 pub mod protocol;
 
 pub use diagnose::{Diagnosis, FoundCamera, diagnose};
@@ -13,13 +12,16 @@ pub use diagnose::{Diagnosis, FoundCamera, diagnose};
 use super::{Applied, Camera, CameraError, Description, Release, Settings, Shutter};
 use crate::files::FileError;
 use helper::{CallError, Helper};
-use protocol::{Answer, Moment, Opened, PROTOCOL, Request, Setup};
+use protocol::{Answer, Fault, Moment, Opened, PROTOCOL, Request, Setup};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Name of the helper's executable.
 const HELPER: &str = "weavelight-tether";
+
+/// The helper of a scan that was killed lets the camera go within two seconds; a scan that resumes at once waits for it.
+const HANDOVER: Duration = Duration::from_secs(3);
 
 /// How a tethered camera is reached.
 #[derive(Clone, Debug)]
@@ -163,8 +165,10 @@ impl TetheredCamera {
         let exposure = Duration::try_from_secs_f64(exposure_s).unwrap_or_default();
         // The camera may subtract a dark frame of its own, which takes as long again.
         let longer = 2 * exposure + within;
+        self.revive()?;
+        // Before the helper hears of it: whatever the listener looks at is seen before the shutter can move.
+        shutter.open();
         let answer = self.ask(request, longer, &mut |moment| match moment {
-            Moment::ShutterOpens => shutter.open(),
             Moment::ShutterClosed => shutter.closed(),
         })?;
         match answer {
@@ -181,8 +185,17 @@ impl TetheredCamera {
 }
 
 fn open(helper: &mut Helper, tether: &Tether) -> Result<Opened, CameraError> {
-    let request = Request::Open { port: tether.port.clone() };
-    match helper.call(request, tether.patience, &mut |_| {}) {
+    let deadline = Instant::now() + HANDOVER;
+    let mut call = || {
+        let request = Request::Open { port: tether.port.clone() };
+        helper.call(request, tether.patience, &mut |_| {})
+    };
+    let mut result = call();
+    while result == Err(CallError::Fault(Fault::Claimed)) && Instant::now() < deadline {
+        std::thread::sleep(HANDOVER / 10);
+        result = call();
+    }
+    match result {
         Ok(Answer::Opened(opened)) => Ok(opened),
         Ok(_) => Err(fault::camera_error(CallError::Ended, tether.picture_within)),
         // A camera that blocks the library while it is being connected does not answer.
@@ -228,7 +241,8 @@ impl Camera for TetheredCamera {
         shutter: &mut dyn Shutter,
     ) -> Result<PathBuf, CameraError> {
         self.taken += 1;
-        let part = folder.join(format!(".tethered-{:04}.part", self.taken));
+        // No other scan's helper, on its last legs, writes to the same.
+        let part = folder.join(format!(".tethered-{}-{:04}.part", std::process::id(), self.taken));
         remove_left(&part)?;
         let name = self.capture_to(&part, shutter).inspect_err(|_| {
             let _left = remove_left(&part);

@@ -80,8 +80,6 @@ pub enum Said {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
-    /// The shutter is about to open.
-    ShutterOpens,
     /// The shutter has closed; the transfer begins.
     ShutterClosed,
 }
