@@ -56,8 +56,10 @@ SOAK_S ?= 900
 soak: packages-all firmware
 	WEAVELIGHT_SOAK_S=$(SOAK_S) cargo test --locked --release --test board -- --ignored --nocapture fifteen_minutes
 
+# The program killed while it scans; make kills KILLS=20 for fewer.
+KILLS ?= 200
 kills: packages-all firmware
-	cargo test --locked --release --test scan -- --ignored --nocapture two_hundred_kills
+	WEAVELIGHT_KILLS=$(KILLS) cargo test --locked --release --test scan -- --ignored --nocapture two_hundred_kills
 
 scan-timing: packages-all firmware
 	cargo test --locked --release --test scan -- --ignored --nocapture ten_full_size_frames

@@ -15,6 +15,7 @@ use weavelight::files::sha256_of_file;
 use weavelight::instrument::Rig;
 use weavelight::session::Session;
 use weavelight::simulate::{self, Part, Scene};
+use weavelight_sim::cloth::Preset;
 
 /// Exposure of the tests: short in time, long in light.
 pub(crate) const SETTINGS: Settings = Settings { exposure_s: 0.02, iso: 1200.0 };
@@ -48,10 +49,9 @@ impl Laboratory {
 
     /// On the disk, whose speed matters for timings.
     pub(crate) fn on_disk(size_px: [usize; 2]) -> Self {
-        // Neither swatch nor truth: only the rig is wanted.
+        // A dark cloth: exposures of half a second, as on the bench.
         Self::in_folder(tempfile::tempdir().unwrap(), size_px, |options| {
-            options.only = vec![Part::Board];
-            options.targets.boards = 1;
+            options.material.preset = Preset::Denim;
         })
     }
 
@@ -167,6 +167,11 @@ impl Line {
     pub(crate) fn eyes(sim: &SimBoard) -> Eyes {
         let line = Mutex::new(Self::to(sim));
         Box::new(move || line.lock().unwrap().pins())
+    }
+
+    /// The board's time, microseconds.
+    pub(crate) fn board_us(&mut self) -> u64 {
+        self.command("pins").split(' ').next().unwrap().parse().unwrap()
     }
 
     /// The outputs.

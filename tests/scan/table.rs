@@ -54,7 +54,10 @@ fn longer(path: &Path) {
 
 /// The table.
 pub(crate) fn cases() -> Vec<Case> {
-    [wire(), board(), lights(), camera(), files(), disk()].into_iter().flatten().collect()
+    [wire(), board(), lights(), camera_once(), camera_lasting(), files(), disk()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 fn wire() -> Vec<Case> {
@@ -235,96 +238,79 @@ fn lights() -> Vec<Case> {
     ]
 }
 
-fn camera() -> Vec<Case> {
+/// What passes by itself.
+fn camera_once() -> Vec<Case> {
     use CameraError as E;
-    use Ends::{Complete, Resumes};
-    use Times::{Always, Once};
-    let camera = |fault, sees, ends, times, make: fn() -> Mishap| {
-        case("camera", fault, sees, ends, How::Camera(times, make))
+    let camera = |fault, sees, make: fn() -> Mishap| {
+        case("camera", fault, sees, Ends::Complete, How::Camera(Times::Once, make))
     };
     vec![
         camera(
-            "unplugged for good",
-            "light 2: no camera found; connect it by USB and switch it on",
-            Resumes,
-            Always,
-            || Mishap::Error(E::NoneFound),
-        ),
-        camera(
             "asleep",
             "light 2 was taken again: the camera does not answer, as if asleep; wake it",
-            Complete,
-            Once,
             || Mishap::Error(E::Asleep),
-        ),
-        camera(
-            "battery low",
-            "light 2: the camera's battery is low (7 %); charge or change it",
-            Resumes,
-            Always,
-            || Mishap::Error(E::BatteryLow { percent: Some(7) }),
-        ),
-        camera(
-            "mode dial off M",
-            "light 2: the camera's mode dial is at P, so exposures cannot be set; turn it to M",
-            Resumes,
-            Always,
-            || Mishap::Error(E::WrongMode { mode: "P".to_owned() }),
-        ),
-        camera(
-            "memory card full",
-            "light 2: the camera's memory card is full; empty it",
-            Resumes,
-            Always,
-            || Mishap::Error(E::CardFull),
         ),
         camera(
             "out of focus",
             "light 2 was taken again: the camera does not find focus; focus by hand",
-            Complete,
-            Once,
             || Mishap::Error(E::OutOfFocus),
         ),
         camera(
             "no picture after the shutter",
             "light 2 was taken again: the camera released its shutter, but no picture came within 20 s",
-            Complete,
-            Once,
             || Mishap::Error(E::NoPicture { after: WAITED }),
         ),
         camera(
             "link cut while a frame is read",
             "light 2 was taken again: the connection to the camera broke (end of file); check its cable",
-            Complete,
-            Once,
             || Mishap::Error(E::LinkLost { reason: "end of file".to_owned() }),
         ),
         camera(
             "busy with its menus",
             "light 2 was taken again: the camera is busy with something else; leave its menus",
-            Complete,
-            Once,
             || Mishap::Error(E::Busy),
         ),
+    ]
+}
+
+/// What somebody has to mend.
+fn camera_lasting() -> Vec<Case> {
+    use CameraError as E;
+    let camera = |fault, sees, make: fn() -> Mishap| {
+        case("camera", fault, sees, Ends::Resumes, How::Camera(Times::Always, make))
+    };
+    vec![
+        camera(
+            "unplugged for good",
+            "light 2: no camera found; connect it by USB and switch it on",
+            || Mishap::Error(E::NoneFound),
+        ),
+        camera(
+            "battery low",
+            "light 2: the camera's battery is low (7 %); charge or change it",
+            || Mishap::Error(E::BatteryLow { percent: Some(7) }),
+        ),
+        camera(
+            "mode dial off M",
+            "light 2: the camera's mode dial is at P, so exposures cannot be set; turn it to M",
+            || Mishap::Error(E::WrongMode { mode: "P".to_owned() }),
+        ),
+        camera("memory card full", "light 2: the camera's memory card is full; empty it", || {
+            Mishap::Error(E::CardFull)
+        }),
         camera(
             "never ready",
             "light 2: the camera is not ready after 20 s; switch it off and on. 3 frames are safe",
-            Resumes,
-            Always,
             || Mishap::Error(E::NeverReady { after: WAITED }),
         ),
         camera(
             "taken by another program",
             "light 2: another program is using the camera (gvfs-gphoto2); close it",
-            Resumes,
-            Always,
             || Mishap::Error(E::Claimed { by: Some("gvfs-gphoto2".to_owned()) }),
         ),
         camera(
             "permission denied",
             "light 2: permission to use the camera is denied; install the udev rules",
-            Resumes,
-            Always,
             || Mishap::Error(E::Permission),
         ),
     ]
@@ -419,7 +405,7 @@ fn disk() -> Vec<Case> {
             "this frame is missing",
             Complete,
             How::BeforeResume(|session| {
-                std::fs::remove_file(session.join("light-03.dng")).unwrap()
+                std::fs::remove_file(session.join("light-03.dng")).unwrap();
             }),
         ),
         case(

@@ -2,24 +2,26 @@
 
 use crate::laboratory::{Laboratory, Line};
 use crate::simboard::SimBoard;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use weavelight::device::board::{Board, PortChoice};
 use weavelight::device::camera::{
-    Applied, Camera, CameraError, Description, Release, Settings, Shutter, SimulatedCamera,
+    Applied, Camera, CameraError, Description, Release, Settings, Shutter,
 };
 use weavelight::device::scan::{About, Begin, Control, Options, scan};
+use weavelight::session::Session;
 
 /// Full size, as the reference camera's.
 const FULL: [usize; 2] = [4928, 3264];
-const EXPOSURE_S: f64 = 0.5;
 /// What a tethered camera of this kind needs for a frame.
 const TRANSFER: Duration = Duration::from_millis(350);
 
 /// Hands over frames that were rendered before, chosen by the pins, at the speed of a tethered camera.
 struct Prerendered {
-    frames: std::collections::HashMap<u32, PathBuf>,
+    frames: HashMap<u32, PathBuf>,
     line: Line,
+    exposure_s: f64,
     exposures: Vec<(u32, u32)>,
     /// Exposure and transfer, as the camera knows them.
     busy: Duration,
@@ -42,7 +44,7 @@ impl Camera for Prerendered {
         shutter.open();
         let start = Instant::now();
         let open = self.line.pins();
-        std::thread::sleep(Duration::from_secs_f64(EXPOSURE_S));
+        std::thread::sleep(Duration::from_secs_f64(self.exposure_s));
         let close = self.line.pins();
         self.busy += start.elapsed();
         shutter.closed();
@@ -62,25 +64,25 @@ impl Camera for Prerendered {
 fn ten_full_size_frames() {
     let Some(sim) = SimBoard::on_a_port(&[]) else { return };
     let laboratory = Laboratory::on_disk(FULL);
-    let wanted = Settings { exposure_s: EXPOSURE_S, iso: 100.0 };
-    let mut frames = std::collections::HashMap::new();
-    for lit in std::iter::once(0).chain((0..10).map(|light| 1 << light)) {
-        let scene = laboratory.scene.clone();
-        let mut camera =
-            SimulatedCamera::new(&laboratory.rig, scene, Box::new(move || lit)).unwrap();
-        camera.configure(wanted).unwrap();
-        let folder = laboratory.path(&format!("lit-{lit}"));
-        std::fs::create_dir(&folder).unwrap();
-        frames.insert(lit, camera.capture(&folder, &mut ()).unwrap());
-    }
+    let swatch = Session::load(&laboratory.path("rig/swatch")).unwrap();
+    let exposure_s = swatch.frames[0].exposure_s;
+    let taken = swatch.frames.iter().filter(|frame| !frame.drift_check);
+    let frames: HashMap<u32, PathBuf> = taken
+        .map(|frame| (frame.light.map_or(0, |light| 1 << light), swatch.frame_path(frame)))
+        .collect();
     let bytes = std::fs::metadata(&frames[&1]).unwrap().len();
-    let mut camera =
-        Prerendered { frames, line: Line::to(&sim), exposures: vec![], busy: Duration::ZERO };
+    let mut camera = Prerendered {
+        frames,
+        line: Line::to(&sim),
+        exposure_s,
+        exposures: vec![],
+        busy: Duration::ZERO,
+    };
     let options = Options {
         folder: laboratory.path("session"),
         about: About { name: None, thickness_mm: None },
         begin: Begin::Anew,
-        exposure_s: Some(EXPOSURE_S),
+        exposure_s: Some(exposure_s),
         iso: 100.0,
         bracket: vec![],
     };
