@@ -2,7 +2,7 @@
 
 use super::{Cell, Emitter, Place, PoseSigma, Prior, Sample, Sheet};
 use crate::description::Plane;
-use nalgebra::{Point3, UnitVector3, Vector3};
+use nalgebra::{Point3, Rotation3, UnitVector3, Vector3};
 
 pub(crate) struct Bench {
     pub(crate) noise: f64,
@@ -11,7 +11,17 @@ pub(crate) struct Bench {
     pub(crate) ruler_error_mm: f64,
     pub(crate) ruler_sigma_mm: f64,
     pub(crate) grid: [usize; 2],
+    pub(crate) unevenness: Unevenness,
     pub(crate) seed: u64,
+}
+
+/// 2 % peak to peak, fixed to the sheet.
+#[derive(Clone, Copy)]
+pub(crate) enum Unevenness {
+    /// Two long crossed waves.
+    Crossed,
+    /// One wave: length, direction (radians), phase (radians).
+    Wave { length_mm: f64, direction: f64, phase: f64 },
 }
 
 impl Default for Bench {
@@ -23,6 +33,7 @@ impl Default for Bench {
             ruler_error_mm,
             ruler_sigma_mm: 10.0,
             grid: [30, 20],
+            unevenness: Unevenness::Crossed,
             seed: 1,
         }
     }
@@ -122,7 +133,8 @@ impl Bench {
         for row in 0..rows {
             for column in 0..columns {
                 let cell = cell_at([column, row], self.grid, plane);
-                let gain = vignetting(&cell.pixel) * 0.99 * unevenness(&cell.point_mm, plane);
+                let gain =
+                    vignetting(&cell.pixel) * 0.99 * self.unevenness.at(&cell.point_mm, plane);
                 for (led, ripple) in leds.iter().zip(&ripples) {
                     let error = self.kappa * wave(&cell.pixel, ripple) + self.noise * dice.normal();
                     let exact =
@@ -179,10 +191,21 @@ pub(crate) fn vignetting(pixel: &[f64; 2]) -> f64 {
     1.0 - 0.2 * (x * x + y * y) / 2.0
 }
 
-/// 2 % peak to peak, fixed to the sheet.
-fn unevenness(point: &Point3<f64>, plane: &Plane) -> f64 {
-    let at = point - plane.point_mm;
-    1.0 + 0.005 * (at.x / 70.0 + 0.4).sin() + 0.005 * (at.y / 55.0 - 0.8).cos()
+impl Unevenness {
+    fn at(self, point: &Point3<f64>, plane: &Plane) -> f64 {
+        // As if the sheet had been tilted out of the table about its stated point.
+        let tilt = Rotation3::rotation_between(&Vector3::z(), &plane.normal).unwrap();
+        let at = tilt.inverse() * (point - plane.point_mm);
+        match self {
+            Self::Crossed => {
+                1.0 + 0.005 * (at.x / 70.0 + 0.4).sin() + 0.005 * (at.y / 55.0 - 0.8).cos()
+            }
+            Self::Wave { length_mm, direction, phase } => {
+                let along = at.x * direction.cos() + at.y * direction.sin();
+                1.0 + 0.01 * (std::f64::consts::TAU * along / length_mm + phase).sin()
+            }
+        }
+    }
 }
 
 /// Unit RMS, about one wave across the frame.

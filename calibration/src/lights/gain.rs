@@ -10,14 +10,15 @@ use nalgebra::{Cholesky, DMatrix, DVector, Rotation3, Vector3};
 
 /// Degree of the smooth surfaces that describe a sheet at one pose: the flat sheet must read exactly.
 const ONE_POSE_DEGREE: usize = 7;
-/// Degree of what is left per light over several poses, of vignetting beyond its radial part, and of the sheet itself.
+/// Degree of what is left per light over several poses, and of vignetting beyond its radial part.
 const SMOOTH_DEGREE: usize = 4;
-/// Spread of the coefficients (natural logarithm) before the pictures: a sheet's unevenness, and vignetting that is not
-/// radial. They tell the two apart where the poses do not.
+/// Degree of the sheet's own unevenness: enough for waves of half the sheet's length. What a stiffer surface cannot follow
+/// would be taken for paper and vignetting in the directions that the poses hardly tell apart, several times enlarged.
+const SHEET_DEGREE: usize = 12;
+/// Spread of the coefficients (natural logarithm) before the pictures: a sheet's unevenness (of degree 1; falling with the
+/// degree), and vignetting that is not radial. They tell the two apart where the poses do not.
 const UNEVEN_SIGMA: f64 = 0.01;
 const OFF_RADIAL_SIGMA: f64 = 0.002;
-/// In-plane half size by which sheet coordinates are normalised.
-const SHEET_HALF_MM: f64 = 220.0;
 /// Cells farther from the smooth gain than this many robust sigmas show no sheet.
 const OUTLIER_SIGMAS: f64 = 5.0;
 
@@ -104,7 +105,7 @@ impl Channel {
         let residual_rms = residual_rms(&places, per_light_degree, &per_light, &left_over);
         let centre = vignetting.at_centre();
         let log_intensity = relative.iter().map(|a| a + centre).collect();
-        let unevenness = several.then(|| peak_to_peak(sheets, &sheet));
+        let unevenness = several.then(|| sheet.peak_to_peak(&sheets[0]));
         Self { log_intensity, vignetting, per_light, per_light_degree, unevenness, residual_rms }
     }
 
@@ -217,24 +218,23 @@ fn separate(
     gains: &[Vec<f64>],
     frame_px: [usize; 2],
     several: bool,
-) -> (Surface, DVector<f64>) {
+) -> (Surface, Unevenness) {
     let degree = if several { SMOOTH_DEGREE } else { ONE_POSE_DEGREE };
     let off_radial = degrees(1, degree).count();
-    let on_sheet = if several { degrees(1, SMOOTH_DEGREE).count() } else { 0 };
+    let area = SheetArea::seen(sheets);
     let sigma = if several { OFF_RADIAL_SIGMA } else { 1.0 };
     let mut precision = vec![1e-6, 1e-2, 1e-2, 1e-2];
     precision.extend(vec![sigma.powi(-2); off_radial]);
-    precision.extend(vec![UNEVEN_SIGMA.powi(-2); on_sheet]);
+    if several {
+        let sigma = |(a, b): (usize, usize)| UNEVEN_SIGMA / (a + b) as f64;
+        precision.extend(degrees(1, SHEET_DEGREE).map(|pair| sigma(pair).powi(-2)));
+    }
     let mut rows = Vec::new();
     for (sheet, gains) in sheets.iter().zip(gains) {
         for ((cell, place), gain) in sheet.cells.iter().zip(places(sheet, frame_px)).zip(gains) {
             let mut row = vignetting_basis(place, frame_px, degree);
             if several {
-                row.extend(legendre_products(
-                    in_sheet(sheet, &cell.point_mm.coords),
-                    1,
-                    SMOOTH_DEGREE,
-                ));
+                row.extend(area.basis(sheet, &cell.point_mm.coords));
             }
             if gain.is_finite() {
                 rows.push((row, *gain));
@@ -244,30 +244,66 @@ fn separate(
     let all = robust_ridge(&rows, &precision);
     let split = 4 + off_radial;
     let mut vignetting = Surface { coefficients: all.rows(0, split).into_owned(), degree };
-    let sheet = all.rows(split, on_sheet).into_owned();
+    let coefficients = all.rows(split, all.len() - split).into_owned();
     // What the sheet has on average belongs to its stated reflectance.
-    let mean = rows.iter().map(|(row, _)| dot(&sheet, &row[split..])).sum::<f64>()
+    let mean = rows.iter().map(|(row, _)| dot(&coefficients, &row[split..])).sum::<f64>()
         / rows.len().max(1) as f64;
     vignetting.coefficients[0] += mean;
-    (vignetting, sheet)
+    (vignetting, Unevenness { coefficients, area })
 }
 
-/// Coordinates in the sheet, normalised: as if it had been tilted out of the table about its stated point.
+/// The part of the sheet that any pose shows, in its own coordinates, millimetres.
+struct SheetArea {
+    middle: [f64; 2],
+    half: [f64; 2],
+}
+
+impl SheetArea {
+    fn seen(sheets: &[Sheet]) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for sheet in sheets {
+            for cell in &sheet.cells {
+                let at = in_sheet(sheet, &cell.point_mm.coords);
+                low = std::array::from_fn(|k| low[k].min(at[k]));
+                high = std::array::from_fn(|k| high[k].max(at[k]));
+            }
+        }
+        Self {
+            middle: std::array::from_fn(|k| 0.5 * (low[k] + high[k])),
+            half: std::array::from_fn(|k| (0.5 * (high[k] - low[k])).max(f64::MIN_POSITIVE)),
+        }
+    }
+
+    fn basis(&self, sheet: &Sheet, point: &Vector3<f64>) -> Vec<f64> {
+        let at = in_sheet(sheet, point);
+        let place = std::array::from_fn(|k| (at[k] - self.middle[k]) / self.half[k]);
+        legendre_products(place, 1, SHEET_DEGREE)
+    }
+}
+
+/// ln of the sheet's own reflectance over its area.
+struct Unevenness {
+    coefficients: DVector<f64>,
+    area: SheetArea,
+}
+
+impl Unevenness {
+    /// Of what one sheet shows.
+    fn peak_to_peak(&self, sheet: &Sheet) -> f64 {
+        let at = |point: &Vector3<f64>| dot(&self.coefficients, &self.area.basis(sheet, point));
+        let values = sheet.cells.iter().map(|cell| at(&cell.point_mm.coords));
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high.exp() - low.exp()
+    }
+}
+
+/// Coordinates in the sheet, millimetres: as if it had been tilted out of the table about its stated point.
 fn in_sheet(sheet: &Sheet, point: &Vector3<f64>) -> [f64; 2] {
     let tilt = Rotation3::rotation_between(&Vector3::z(), &sheet.plane.normal)
         .unwrap_or_else(Rotation3::identity);
     let flat = tilt.inverse() * (point - sheet.plane.point_mm.coords);
-    [flat.x / SHEET_HALF_MM, flat.y / SHEET_HALF_MM]
-}
-
-fn peak_to_peak(sheets: &[Sheet], coefficients: &DVector<f64>) -> f64 {
-    let at = |sheet: &Sheet, point: &Vector3<f64>| {
-        dot(coefficients, &legendre_products(in_sheet(sheet, point), 1, SMOOTH_DEGREE))
-    };
-    let values = sheets[0].cells.iter().map(|cell| at(&sheets[0], &cell.point_mm.coords));
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    high.exp() - low.exp()
+    [flat.x, flat.y]
 }
 
 /// The surface in pixel coordinates that all sheets share: each sheet's own is fitted, and every coefficient of their mean

@@ -93,6 +93,33 @@ fn six_poses_find_every_led() {
 }
 
 #[test]
+fn the_sheet_is_told_from_vignetting_whatever_its_waves() {
+    for (length_mm, direction, phase) in
+        [(180.0, 0.3, 0.0), (180.0, 2.6, 2.0), (230.0, 1.4, 4.0), (400.0, 0.8, 1.0)]
+    {
+        let unevenness = bench_scene::Unevenness::Wave { length_mm, direction, phase };
+        let bench = Bench { unevenness, ..Bench::default() };
+        let leds = bench.leds();
+        let (_, gains, _) = run(&bench, &bench.sheets(&leds, &poses()), &leds);
+        let level = gains.intensity[0][1] / leds[0].intensity[1];
+        let off = |(t, gain): (usize, &[f32; 3])| {
+            let at =
+                |index: usize, count: f64, length: f64| (index as f64 + 0.5) * length / count - 0.5;
+            let pixel = [at(t % 40, 40.0, 4928.0), at(t / 40, 27.0, 3264.0)];
+            level * f64::from(gain[1]) / bench_scene::vignetting(&pixel) - 1.0
+        };
+        let off: Vec<f64> = gains.maps[0].data.iter().enumerate().map(off).collect();
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        let bent = rms(&off.iter().map(|off| off - mean).collect::<Vec<_>>());
+        // The level is the mean of what is seen of the sheet, which is not its mean without end.
+        assert!(mean.abs() <= 0.0075, "level off by {mean} at {length_mm} mm");
+        assert!(bent <= 0.002, "bent by {bent} at {length_mm} mm");
+        let found = gains.sheet_unevenness.unwrap();
+        assert!((found - 0.02).abs() < 0.003, "unevenness {found} at {length_mm} mm");
+    }
+}
+
+#[test]
 fn light_dependent_slow_errors_cost_little_and_widen_sigma() {
     let (fit, ..) = check(&Bench { kappa: 1e-3, ..Bench::default() }, 1.0, 0.02);
     assert!((3e-4..3e-3).contains(&fit.slow_error_rms), "{}", fit.slow_error_rms);
