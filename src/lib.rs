@@ -11,7 +11,7 @@
 //! - [`photometry`]: the kernels, on one band of rows; [`solve`]: the run around them
 //! - [`simulate`]: the simulated rig's folders
 //! - [`device`]: the light board, and what else the capture needs of the world
-//! - [`report`]: what a command tells; [`bench`]: run time against error
+//! - [`report`]: what a command tells; [`mod@bench`]: run time against error
 
 pub mod bench;
 pub mod calibrate;
