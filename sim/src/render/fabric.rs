@@ -322,9 +322,10 @@ fn tabulate(fabric: &Fabric, stage: &Stage, tile: Tile) -> HeightGrid {
     let reach = shadow_reach_mm(fabric, stage, &middle);
     let step = fabric.grid_step_mm(stage.view.mm_per_px());
     let margin = reach + 2.0 * step + stage.view.mm_per_px();
-    HeightGrid::tabulate(least.map(|c| c - margin), most.map(|c| c + margin), step, |x, y| {
-        fabric.height_mm(x, y)
-    })
+    // On one lattice for the whole table: shadows reach as far as the lights of this stage cast them, but where the nodes
+    // lie must not depend on which lights are lit, or frames of single lights would see different yarns.
+    let origin = least.map(|c| ((c - margin) / step).floor() * step);
+    HeightGrid::tabulate(origin, most.map(|c| c + margin), step, |x, y| fabric.height_mm(x, y))
 }
 
 /// Points around a tile at which its outline is followed; the half pixels around it are within the grid's margin.

@@ -54,6 +54,23 @@ fn the_same_seed_gives_the_same_pictures_whatever_the_threads() {
     assert!(one.0 != shoot(6).0, "another seed");
 }
 
+/// A camera photographs light after light, a simulation may render all at once: both see the same yarns.
+#[test]
+fn a_light_alone_lights_the_weave_that_all_lights_light() {
+    let all = stage(120, 80);
+    let linen = fabric(Preset::Linen.cloth(3));
+    let sensor = Sensor::default().without_noise();
+    let together = shoot(&linen, &all, &sensor, &shots(), &|_| {});
+    for (k, light) in all.lights.iter().enumerate() {
+        let stage = Stage { lights: vec![light.clone()], ..stage(120, 80) };
+        let shot = Shot { light: Some(0), exposure: 0.4, strength: 1.0, number: k as u64 };
+        let alone = shoot(&linen, &stage, &sensor, &[shot], &|_| {});
+        let pairs = alone[0].iter().zip(&together[k]);
+        let apart = pairs.filter(|&(a, b)| a.abs_diff(*b) > 2).count();
+        assert!(apart * 100 < 120 * 80, "light {k}: {apart} photosites differ");
+    }
+}
+
 /// The signal of one photosite, all lights, without noise: what the physics says, written down directly.
 #[test]
 fn a_lambertian_facet_shows_what_the_formula_says() {
