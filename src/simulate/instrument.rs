@@ -101,11 +101,16 @@ impl Instrument {
         std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
     }
 
-    /// Writes `rig.toml` and the true calibration.
+    /// Writes `scene.toml` and `rig.toml`: with the second, the folder is a rig's.
+    pub(super) fn write_rig(&self, options: &Options, folder: &Path) -> Result<(), SimulateError> {
+        Scene::of(options, self).save(folder)?;
+        Ok(self.rig.save(&folder.join("rig.toml"))?)
+    }
+
+    /// Writes `rig.toml`, `scene.toml` and the true calibration.
     pub(super) fn write(&self, options: &Options, folder: &Path) -> Result<(), SimulateError> {
         let rig_path = folder.join("rig.toml");
-        self.rig.save(&rig_path)?;
-        Scene::of(options, self).save(folder)?;
+        self.write_rig(options, folder)?;
         let input =
             crate::files::Input { name: "rig.toml".to_owned(), sha256: sha256_of_file(&rig_path)? };
         let mut quality = toml::Table::new();

@@ -19,7 +19,7 @@ pub use instrument::Instrument;
 pub use options::{Flaws, Material, Options, Part, Targets};
 pub use scene::{SCENE_FILE, Scene};
 
-use crate::files::{OutputKind, StagedFolder};
+use crate::files::{FileError, OutputKind, StagedFolder};
 use parts::Studio;
 use std::path::PathBuf;
 
@@ -89,6 +89,18 @@ pub fn run(
     staged.commit()?;
     progress(1.0, "done");
     Ok(summary)
+}
+
+/// Writes only what a technician has before the first picture, `rig.toml`, and the `scene.toml` that the simulated camera
+/// looks at, into the folder `options.out` (made where absent; what else is in it stays).
+///
+/// # Errors
+/// As [`run`].
+pub fn write_rig(options: &Options) -> Result<(), SimulateError> {
+    options.check()?;
+    let folder = &options.out;
+    std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    Instrument::from_options(options)?.write_rig(options, folder)
 }
 
 #[cfg(test)]

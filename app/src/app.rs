@@ -1,0 +1,215 @@
+//! The window as a whole: the rooms' rail, the room that is open, what is going on, what went wrong, and the keys.
+
+use crate::desk::{Activity, Desk};
+use crate::rooms::{
+    Room, calibrate::Calibrate, look::Look, rig::Rig, scan::Scan, scans::Scans, welcome::Welcome,
+};
+use crate::settings::{Settings, Theme};
+use crate::worker::{Command, Update, Worker};
+use crate::{texts, theme, widgets};
+use eframe::egui::{self, Key, Modifiers, RichText};
+use eframe::egui_wgpu::RenderState;
+
+/// The window.
+#[derive(Debug)]
+pub struct App {
+    desk: Desk,
+    worker: Worker,
+    welcome: Welcome,
+    rig: Rig,
+    calibrate: Calibrate,
+    scan: Scan,
+    look: Look,
+    scans: Scans,
+}
+
+impl App {
+    /// A window as it was when it was closed. `renderer`: where the Look room puts its textures; the window works without.
+    pub fn new(ctx: &egui::Context, renderer: Option<&RenderState>, settings: Settings) -> Self {
+        theme::apply(ctx, &settings);
+        let worker = Worker::start(ctx.clone());
+        if let Some(rig) = settings.rig.clone().filter(|rig| rig.exists()) {
+            worker.ask(Command::Open(rig));
+        }
+        let _ = renderer;
+        Self {
+            desk: Desk::new(settings),
+            worker,
+            welcome: Welcome::default(),
+            rig: Rig::default(),
+            calibrate: Calibrate::default(),
+            scan: Scan::default(),
+            look: Look::default(),
+            scans: Scans::default(),
+        }
+    }
+
+    /// What all rooms share.
+    pub fn desk(&self) -> &Desk {
+        &self.desk
+    }
+
+    fn hear(&mut self, update: Update) {
+        let desk = &mut self.desk;
+        match update {
+            Update::Began(title) => desk.activity = Some(Activity::new(title)),
+            Update::Progress { share, step, left } => {
+                if let Some(activity) = &mut desk.activity {
+                    (activity.share, activity.step, activity.left) = (share, step, left);
+                }
+            }
+            Update::Ended => desk.activity = None,
+            Update::Problem(problem) => desk.tell(problem),
+            Update::Opened(place) => {
+                desk.settings.rig = Some(place.folder.clone());
+                desk.place = Some(*place);
+            }
+            Update::Rig(told) => self.rig.hear(told, desk),
+            Update::Calibrate(told) => self.calibrate.hear(told, desk),
+            Update::Scan(told) => self.scan.hear(told, desk),
+            Update::Look(told) => self.look.hear(told, desk),
+            Update::Scans(told) => self.scans.hear(told, desk),
+        }
+    }
+
+    fn room(&mut self, ui: &mut egui::Ui) {
+        if self.desk.place.is_none() {
+            return self.welcome.ui(ui, &mut self.desk);
+        }
+        let desk = &mut self.desk;
+        match desk.settings.room {
+            Room::Rig => self.rig.ui(ui, desk),
+            Room::Calibrate => self.calibrate.ui(ui, desk),
+            Room::Scan => self.scan.ui(ui, desk),
+            Room::Look => self.look.ui(ui, desk),
+            Room::Scans => self.scans.ui(ui, desk),
+        }
+    }
+
+    /// Control and a digit opens a room, Escape ends what is going on; a folder that is dropped is opened.
+    fn keys(&mut self, ctx: &egui::Context) {
+        const DIGITS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
+        for (room, digit) in Room::ALL.into_iter().zip(DIGITS) {
+            if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, digit)) {
+                self.desk.go_to(room);
+            }
+        }
+        if self.desk.is_busy() && ctx.input(|input| input.key_pressed(Key::Escape)) {
+            self.worker.brake.cancel();
+        }
+        let dropped = ctx.input(|input| input.raw.dropped_files.clone());
+        if let Some(path) = dropped.into_iter().next().map(|file| file.path().to_owned()) {
+            self.desk.ask(Command::Open(path));
+        }
+    }
+
+    fn rail(&mut self, ui: &mut egui::Ui) {
+        ui.add_space(theme::GAP);
+        let open = self.desk.settings.room;
+        ui.with_layout(egui::Layout::top_down_justified(egui::Align::Min), |ui| {
+            for (k, room) in Room::ALL.into_iter().enumerate() {
+                let text = RichText::new(room.name()).size(15.0);
+                let button =
+                    egui::Button::selectable(room == open, text).min_size(egui::vec2(0.0, 36.0));
+                let enabled = self.desk.place.is_some();
+                let hint = format!("Ctrl+{}", k + 1);
+                if ui.add_enabled(enabled, button).on_hover_text(hint).clicked() {
+                    self.desk.go_to(room);
+                }
+            }
+        });
+        ui.with_layout(egui::Layout::bottom_up(egui::Align::Min), |ui| {
+            ui.menu_button(texts::VIEW, |ui| view_menu(ui, &mut self.desk.settings));
+        });
+    }
+
+    fn status(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal_centered(|ui| {
+            match &self.desk.activity {
+                Some(activity) => {
+                    if widgets::activity(ui, activity) {
+                        self.worker.brake.cancel();
+                    }
+                }
+                None => {
+                    ui.label(RichText::new(texts::READY).weak());
+                }
+            }
+            if let Some(place) = &self.desk.place {
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    let folder = place.folder.display().to_string();
+                    ui.label(RichText::new(&place.rig.name).weak()).on_hover_text(folder);
+                });
+            }
+        });
+    }
+
+    fn problems(&mut self, ui: &mut egui::Ui) {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(texts::PROBLEMS).strong());
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.small_button(texts::DISMISS_ALL).clicked() {
+                    self.desk.problems.clear();
+                }
+            });
+        });
+        egui::ScrollArea::vertical().max_height(180.0).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            // The newest first.
+            let problems = std::mem::take(&mut self.desk.problems);
+            let mut kept: Vec<_> = problems
+                .into_iter()
+                .rev()
+                .filter(|problem| !widgets::problem(ui, problem))
+                .collect();
+            kept.reverse();
+            self.desk.problems = kept;
+        });
+    }
+}
+
+fn view_menu(ui: &mut egui::Ui, settings: &mut Settings) {
+    let before = settings.clone();
+    for (theme, name) in [Theme::System, Theme::Light, Theme::Dark].into_iter().zip(texts::THEMES) {
+        ui.radio_value(&mut settings.theme, theme, name);
+    }
+    ui.separator();
+    ui.label(texts::SCALE);
+    for scale in [0.8, 1.0, 1.25, 1.5, 2.0] {
+        ui.radio_value(&mut settings.scale, scale, format!("{:.0} %", 100.0 * scale));
+    }
+    if *settings != before {
+        theme::apply(ui.ctx(), settings);
+    }
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        let updates: Vec<Update> = self.worker.updates().collect();
+        updates.into_iter().for_each(|update| self.hear(update));
+        self.keys(ctx);
+        for command in self.desk.take_asked() {
+            self.worker.ask(command);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        egui::Panel::bottom("status").exact_size(40.0).show(ui, |ui| self.status(ui));
+        if !self.desk.problems.is_empty() {
+            egui::Panel::bottom("problems").show(ui, |ui| self.problems(ui));
+        }
+        egui::Panel::left("rail").exact_size(116.0).resizable(false).show(ui, |ui| self.rail(ui));
+        egui::CentralPanel::default().show(ui, |ui| self.room(ui));
+        let size = ui.ctx().content_rect().size();
+        self.desk.settings.window_size = [size.x, size.y];
+        for command in self.desk.take_asked() {
+            self.worker.ask(command);
+        }
+    }
+
+    fn on_exit(&mut self) {
+        self.worker.brake.cancel();
+        // There is nobody left to be told.
+        let _ = self.desk.settings.save();
+    }
+}

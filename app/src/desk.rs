@@ -1,0 +1,107 @@
+//! What all rooms share: the rig that is open, what is going on, what went wrong, and what the rooms want done.
+
+use crate::place::Place;
+use crate::rooms::Room;
+use crate::settings::Settings;
+use crate::worker::Command;
+use std::time::{Duration, Instant};
+
+/// Shared by all rooms.
+#[derive(Debug)]
+pub struct Desk {
+    /// What is remembered from start to start.
+    pub settings: Settings,
+    /// The rig that is open.
+    pub place: Option<Place>,
+    /// What the worker is doing.
+    pub activity: Option<Activity>,
+    /// What went wrong and nobody has put away yet; the newest last.
+    pub problems: Vec<Problem>,
+    asked: Vec<Command>,
+}
+
+/// Something that went wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// What was to be done, as in "Scan".
+    pub title: String,
+    /// What is wrong, where, and what to do: the library's own words.
+    pub text: String,
+    /// Whether the work failed, or is done and this ought to be known.
+    pub severity: Severity,
+}
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The work is done; this ought to be known.
+    Warning,
+    /// The work failed.
+    Error,
+}
+
+/// Work under way.
+#[derive(Clone, Debug)]
+pub struct Activity {
+    /// As in "Solving linen 4021".
+    pub title: String,
+    /// The step it is at, as in "light 4".
+    pub step: String,
+    /// Share done, 0 to 1.
+    pub share: f64,
+    /// When it began.
+    pub since: Instant,
+    /// Time left as the work itself foresees it.
+    pub left: Option<Duration>,
+}
+
+impl Activity {
+    /// As it begins.
+    pub fn new(title: String) -> Self {
+        Self { title, step: String::new(), share: 0.0, since: Instant::now(), left: None }
+    }
+
+    /// Time left, once it can be foreseen: as the work says, else from the share done.
+    pub fn time_left(&self) -> Option<Duration> {
+        const FORESEEABLE: f64 = 0.05;
+        let by_share = || {
+            let spent = self.since.elapsed().as_secs_f64();
+            (self.share > FORESEEABLE && spent > 1.0)
+                .then(|| Duration::from_secs_f64(spent * (1.0 - self.share).max(0.0) / self.share))
+        };
+        self.left.or_else(by_share)
+    }
+}
+
+impl Desk {
+    /// An empty desk.
+    pub fn new(settings: Settings) -> Self {
+        Self { settings, place: None, activity: None, problems: Vec::new(), asked: Vec::new() }
+    }
+
+    /// Leaves something to be done.
+    pub fn ask(&mut self, command: Command) {
+        self.asked.push(command);
+    }
+
+    /// What was left to be done, once.
+    pub fn take_asked(&mut self) -> Vec<Command> {
+        std::mem::take(&mut self.asked)
+    }
+
+    /// Whether the worker has something to do that takes its time.
+    pub fn is_busy(&self) -> bool {
+        self.activity.is_some()
+    }
+
+    /// Opens another room.
+    pub fn go_to(&mut self, room: Room) {
+        self.settings.room = room;
+    }
+
+    /// Puts up a problem; the same one twice is one.
+    pub fn tell(&mut self, problem: Problem) {
+        self.problems.retain(|old| *old != problem);
+        self.problems.push(problem);
+    }
+}

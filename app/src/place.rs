@@ -1,0 +1,80 @@
+//! The folders of one rig: everything that belongs to it lies beside its `rig.toml`.
+
+use std::path::{Path, PathBuf};
+use weavelight::instrument::Rig;
+
+/// Name of the rig's file.
+pub const RIG_FILE: &str = "rig.toml";
+
+/// A rig and its folders.
+#[derive(Clone, Debug)]
+pub struct Place {
+    /// The folder.
+    pub folder: PathBuf,
+    /// What `rig.toml` says.
+    pub rig: Rig,
+}
+
+impl Place {
+    /// Opens the folder of a rig, or the rig's file itself.
+    ///
+    /// # Errors
+    /// Where there is no rig, or it cannot be read.
+    pub fn open(path: &Path) -> Result<Self, weavelight::files::FileError> {
+        let file = if path.is_dir() { path.join(RIG_FILE) } else { path.to_owned() };
+        let rig = Rig::load(&file)?;
+        let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
+        Ok(Self { folder, rig })
+    }
+
+    /// The rig's file.
+    pub fn rig_file(&self) -> PathBuf {
+        self.folder.join(RIG_FILE)
+    }
+
+    /// The calibration in use.
+    pub fn calibration(&self) -> PathBuf {
+        self.folder.join("calibration")
+    }
+
+    /// Capture sessions of calibration targets.
+    pub fn targets(&self) -> PathBuf {
+        self.folder.join("targets")
+    }
+
+    /// Capture sessions of swatches.
+    pub fn scans(&self) -> PathBuf {
+        self.folder.join("scans")
+    }
+
+    /// The capture session of that name.
+    pub fn scan(&self, name: &str) -> PathBuf {
+        self.scans().join(folder_name(name))
+    }
+
+    /// The solution of a capture session.
+    pub fn solution(&self, scan: &Path) -> PathBuf {
+        self.folder.join("solutions").join(scan.file_name().unwrap_or_default())
+    }
+}
+
+/// A swatch's name as a folder's: letters, digits, spaces and `-_.`; everything else becomes `-`.
+pub fn folder_name(name: &str) -> String {
+    let keep = |c: char| if c.is_alphanumeric() || " -_".contains(c) { c } else { '-' };
+    let folder: String = name.trim().chars().map(keep).collect();
+    if folder.is_empty() { "scan".to_owned() } else { folder }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_folders_that_stay_inside() {
+        let check = |name: &str, expected: &str| assert_eq!(folder_name(name), expected);
+        check("linen 4021", "linen 4021");
+        check(" ../x/y ", "---x-y");
+        check("", "scan");
+        check("Köper №7", "Köper №7".replace('№', "-").as_str());
+    }
+}

@@ -1,0 +1,68 @@
+//! Where there is no rig yet: one way to try it, one way to open one's own.
+
+use crate::desk::Desk;
+use crate::texts::welcome as texts;
+use crate::theme;
+use crate::worker::Command;
+use eframe::egui::{self, RichText};
+use std::path::PathBuf;
+
+/// What it keeps.
+#[derive(Debug, Default)]
+pub struct Welcome {
+    path: String,
+}
+
+impl Welcome {
+    /// Draws it in the middle of what there is.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.vertical_centered(|ui| {
+            ui.add_space((ui.available_height() * 0.18).max(theme::WIDE_GAP));
+            ui.label(RichText::new(texts::HEADING).size(28.0).strong());
+            ui.label(RichText::new(texts::WHAT).size(16.0));
+            ui.add_space(2.0 * theme::WIDE_GAP);
+            ui.set_max_width(520.0);
+            card(ui, |ui| try_it(ui, desk));
+            ui.add_space(theme::GAP);
+            card(ui, |ui| self.open(ui, desk));
+        });
+    }
+
+    fn open(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.label(RichText::new(texts::OPEN).strong());
+        ui.label(texts::OPEN_WHAT);
+        ui.horizontal(|ui| {
+            let label = ui.label(texts::PATH);
+            let width = ui.available_width() - 190.0;
+            let field = egui::TextEdit::singleline(&mut self.path).desired_width(width.max(80.0));
+            let entered = ui.add(field).labelled_by(label.id).lost_focus()
+                && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            if ui.button(texts::BROWSE).clicked()
+                && let Some(folder) = rfd::FileDialog::new().pick_folder()
+            {
+                self.path = folder.display().to_string();
+            }
+            let named = !self.path.trim().is_empty();
+            if ui.add_enabled(named, egui::Button::new("Open")).clicked() || (entered && named) {
+                desk.ask(Command::Open(PathBuf::from(self.path.trim())));
+            }
+        });
+    }
+}
+
+fn try_it(ui: &mut egui::Ui, desk: &mut Desk) {
+    let text = RichText::new(texts::TRY).size(16.0).strong();
+    let button = egui::Button::new(text).min_size(egui::vec2(300.0, theme::BIG));
+    if ui.add(button).clicked() {
+        desk.ask(Command::MakeSimulatedRig(desk.settings.home.join(texts::SIMULATED)));
+    }
+    ui.label(texts::TRY_WHAT);
+}
+
+fn card(ui: &mut egui::Ui, contents: impl FnOnce(&mut egui::Ui)) {
+    let frame = egui::Frame::group(ui.style()).inner_margin(theme::WIDE_GAP);
+    frame.fill(ui.visuals().faint_bg_color).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.vertical_centered(contents);
+    });
+}

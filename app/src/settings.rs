@@ -1,0 +1,167 @@
+//! What is remembered from one start to the next: `settings.toml` in the user's configuration folder.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What is remembered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Version of this format.
+    pub schema: i64,
+    /// The rig that was open last.
+    pub rig: Option<PathBuf>,
+    /// Where new rigs' folders are made.
+    pub home: PathBuf,
+    /// "light", "dark" or "system".
+    pub theme: Theme,
+    /// Size of everything relative to the system's.
+    pub scale: f32,
+    /// Inner size of the window, points.
+    pub window_size: [f32; 2],
+    /// Which room was open.
+    pub room: crate::rooms::Room,
+    /// How scans are solved.
+    pub solve: SolveSettings,
+    /// Where these settings are kept; not part of the file.
+    #[serde(skip)]
+    file: Option<PathBuf>,
+}
+
+/// Light or dark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Theme {
+    /// As the system has it.
+    #[default]
+    System,
+    /// Dark on light.
+    Light,
+    /// Light on dark.
+    Dark,
+}
+
+/// As `weavelight solve` has them on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SolveSettings {
+    /// `--method`
+    pub method: MethodName,
+    /// `--undistort`
+    pub undistort: bool,
+    /// `--normal-y down`
+    pub normal_y_down: bool,
+}
+
+/// As on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MethodName {
+    /// Robust where the residual asks for it.
+    #[default]
+    Auto,
+    /// Plain.
+    LeastSquares,
+    /// Robust everywhere.
+    Robust,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            schema: 1,
+            rig: None,
+            home: home().join("Weavelight"),
+            theme: Theme::default(),
+            scale: 1.0,
+            window_size: [1280.0, 800.0],
+            room: crate::rooms::Room::Scan,
+            solve: SolveSettings::default(),
+            file: None,
+        }
+    }
+}
+
+impl Settings {
+    /// Those of this user; the defaults where there are none, or they cannot be read: a window that does not open over its
+    /// settings would be worse.
+    pub fn load() -> Self {
+        Self::load_from(&configuration_folder().join("settings.toml"))
+    }
+
+    /// Those in a file; they will be kept there.
+    pub fn load_from(file: &Path) -> Self {
+        let text = std::fs::read_to_string(file).unwrap_or_default();
+        let settings: Self = toml::from_str(&text).unwrap_or_default();
+        Self { file: Some(file.to_owned()), ..settings }
+    }
+
+    /// Writes them where they came from, whole or not at all.
+    ///
+    /// # Errors
+    /// Where that cannot be written.
+    pub fn save(&self) -> Result<(), weavelight::files::FileError> {
+        let Some(file) = &self.file else { return Ok(()) };
+        let text = toml::to_string_pretty(self).unwrap_or_default();
+        if let Some(folder) = file.parent() {
+            let _ = std::fs::create_dir_all(folder);
+        }
+        weavelight::files::write_atomic(file, text.as_bytes())
+    }
+}
+
+impl SolveSettings {
+    /// The library's options for a solve, the same that the command line makes.
+    pub fn options(
+        self,
+        session: &Path,
+        calibration: &Path,
+        out: &Path,
+    ) -> weavelight::solve::Options {
+        use weavelight::photometry::Method;
+        use weavelight::solve::{Grid, NormalY, Options};
+        let mut options = Options::new(session, calibration, out);
+        options.method = match self.method {
+            MethodName::Auto => Method::Auto,
+            MethodName::LeastSquares => Method::LeastSquares,
+            MethodName::Robust => Method::Robust,
+        };
+        options.grid = if self.undistort { Grid::Undistorted } else { Grid::Sensor };
+        options.normal_y = if self.normal_y_down { NormalY::Down } else { NormalY::Up };
+        options
+    }
+}
+
+fn home() -> PathBuf {
+    std::env::home_dir().unwrap_or_else(|| PathBuf::from("."))
+}
+
+fn configuration_folder() -> PathBuf {
+    let base = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
+    base.unwrap_or_else(|| home().join(".config")).join("weavelight")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_saved_is_what_is_loaded() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("deep/settings.toml");
+        let mut settings = Settings::load_from(&file);
+        settings.scale = 1.5;
+        settings.theme = Theme::Dark;
+        settings.solve.method = MethodName::Robust;
+        settings.save().unwrap();
+        assert_eq!(Settings::load_from(&file), settings);
+    }
+
+    #[test]
+    fn a_broken_file_gives_the_defaults() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        std::fs::write(&file, "scale = \"huge").unwrap();
+        assert_eq!(Settings::load_from(&file).scale, 1.0);
+    }
+}

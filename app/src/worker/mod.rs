@@ -1,0 +1,128 @@
+//! The one thread that owns devices and solver. Commands come in, updates go out; the window never waits for it.
+//!
+//! Work that the user no longer wants is ended by unwinding from its progress callback, as rust-analyzer ends its queries:
+//! the library's outputs appear only when whole, so nothing half-written stays.
+
+mod job;
+pub mod open;
+
+pub use job::{Ended, Outbox};
+
+use crate::desk::Problem;
+use crate::place::Place;
+use crate::rooms::{calibrate, look, rig, scan, scans};
+use eframe::egui;
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::time::Duration;
+use weavelight::device::scan::Instruments;
+
+/// What is to be done.
+#[derive(Debug)]
+pub enum Command {
+    /// Open the rig in this folder.
+    Open(PathBuf),
+    /// Make a simulated rig in this folder, and open it.
+    MakeSimulatedRig(PathBuf),
+    /// Of the Rig room.
+    Rig(rig::Ask),
+    /// Of the Calibrate room.
+    Calibrate(calibrate::Ask),
+    /// Of the Scan room.
+    Scan(scan::Ask),
+    /// Of the Look room.
+    Look(look::Ask),
+    /// Of the Scans room.
+    Scans(scans::Ask),
+}
+
+/// What has happened.
+#[derive(Debug)]
+pub enum Update {
+    /// Work that takes its time has begun, as in "Solving linen 4021".
+    Began(String),
+    /// How far it is.
+    Progress {
+        /// 0 to 1.
+        share: f64,
+        /// As in "light 4".
+        step: String,
+        /// Time left where the work foresees it.
+        left: Option<Duration>,
+    },
+    /// It has ended, one way or the other.
+    Ended,
+    /// Something went wrong.
+    Problem(Problem),
+    /// A rig is open.
+    Opened(Box<Place>),
+    /// For the Rig room.
+    Rig(rig::Told),
+    /// For the Calibrate room.
+    Calibrate(calibrate::Told),
+    /// For the Scan room.
+    Scan(scan::Told),
+    /// For the Look room.
+    Look(look::Told),
+    /// For the Scans room.
+    Scans(scans::Told),
+}
+
+/// What the worker holds between commands.
+#[derive(Debug, Default)]
+pub struct Tools {
+    /// The rig that is open.
+    pub place: Option<Place>,
+    /// Its board and camera, opened when first needed and closed with the rig or when they fail.
+    pub instruments: Option<Instruments>,
+}
+
+/// The worker as the window sees it.
+#[derive(Debug)]
+pub struct Worker {
+    commands: Sender<Command>,
+    updates: Receiver<Update>,
+    /// Ends or pauses what is going on.
+    pub brake: job::Brake,
+}
+
+impl Worker {
+    /// Starts the thread; it ends with this value, after what it is doing. `ctx` is woken for every update.
+    pub fn start(ctx: egui::Context) -> Self {
+        let (commands, inbox) = mpsc::channel();
+        let (outbox, updates) = mpsc::channel();
+        let brake = job::Brake::default();
+        let out = Outbox::new(outbox, ctx, brake.clone());
+        std::thread::spawn(move || {
+            let mut tools = Tools::default();
+            for command in inbox {
+                out.begin();
+                act(command, &mut tools, &out);
+            }
+        });
+        Self { commands, updates, brake }
+    }
+
+    /// Hands over a command.
+    pub fn ask(&self, command: Command) {
+        // The thread lives as long as this value.
+        let _ = self.commands.send(command);
+    }
+
+    /// What has happened since.
+    pub fn updates(&self) -> impl Iterator<Item = Update> {
+        self.updates.try_iter()
+    }
+}
+
+fn act(command: Command, tools: &mut Tools, out: &Outbox) {
+    match command {
+        Command::Open(folder) => open::open(&folder, tools, out),
+        Command::MakeSimulatedRig(folder) => open::make_simulated(&folder, tools, out),
+        Command::Rig(ask) => rig::act(ask, tools, out),
+        Command::Calibrate(ask) => calibrate::act(ask, tools, out),
+        Command::Scan(ask) => scan::act(ask, tools, out),
+        Command::Look(ask) => look::act(ask, tools, out),
+        Command::Scans(ask) => scans::act(ask, tools, out),
+    }
+}

@@ -1,0 +1,51 @@
+//! Opening a rig, and making a simulated one.
+
+use super::{Outbox, Tools, Update};
+use crate::place::Place;
+use crate::texts::rig as texts;
+use std::path::Path;
+use weavelight::simulate;
+
+/// A quarter of the reference camera's size: the whole loop in minutes on a small computer.
+const SIZE_PX: [usize; 2] = [1232, 816];
+
+/// Opens the rig in `folder`. Board and camera of the one before are let go.
+pub(super) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
+    match Place::open(folder) {
+        Ok(place) => {
+            tools.instruments = None;
+            tools.place = Some(place.clone());
+            out.tell(Update::Opened(Box::new(place)));
+        }
+        Err(error) => out.fail(texts::OPENING, &error),
+    }
+}
+
+/// Makes a simulated rig that knows what a technician knows: a rig file measured with a ruler, no calibration yet. One that is
+/// there already is opened as it is.
+pub(super) fn make_simulated(folder: &Path, tools: &mut Tools, out: &Outbox) {
+    let made = match folder.join(crate::place::RIG_FILE).exists() {
+        true => Ok(()),
+        false => simulate::write_rig(&simulated(folder)),
+    };
+    match made {
+        Ok(()) => open(folder, tools, out),
+        Err(error) => out.fail(texts::MAKING_SIMULATED, &error),
+    }
+}
+
+/// With what real rigs have: a ruler that errs, a lens that darkens towards the corners, some light in the room.
+fn simulated(folder: &Path) -> simulate::Options {
+    let flaws = simulate::Flaws {
+        ruler_error_mm: 8.0,
+        vignetting: 0.2,
+        ambient: 1.0,
+        ..simulate::Flaws::default()
+    };
+    simulate::Options {
+        out: folder.to_owned(),
+        size_px: Some(SIZE_PX),
+        flaws,
+        ..simulate::Options::default()
+    }
+}
