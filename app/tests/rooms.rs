@@ -7,9 +7,11 @@ use weavelight_app::{App, settings::Settings};
 fn window(folder: &std::path::Path, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut settings = Settings::load_from(&folder.join("settings.toml"));
     settings.home = folder.to_owned();
-    Harness::builder().with_size(size).with_theme(theme).with_max_steps(64).build_eframe(move |cc| {
-        App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings)
-    })
+    Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_max_steps(64)
+        .build_eframe(move |cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings))
 }
 
 #[test]

@@ -115,6 +115,7 @@ fn show(progress: &Progress, event: &Event) {
             let what = format!("{frame}{}", left.unwrap_or_default());
             progress.set(*done as f64 / (*total).max(1) as f64, &what);
         }
+        Event::Kept { .. } => {}
         Event::Again { frame, why } => progress.say(&format!("{frame}: {why}")),
         Event::BoardLost => progress.say("the light board is gone; plug it in again"),
         Event::Paused => progress.say("paused"),

@@ -5,7 +5,7 @@ use super::look::Look;
 use super::shoot::{Shot, Told, shoot};
 use crate::device::board::Board;
 use crate::device::camera::{Camera, Settings};
-use crate::raw::{Hint, decode};
+use crate::raw::{Frame, Hint, decode};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -30,8 +30,10 @@ const GOOD: RangeInclusive<f64> = 0.5..=0.9;
 const GOOD_AIM: f64 = 0.7;
 
 /// What a test shot shows.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Preview {
+    /// The picture.
+    pub frame: Frame,
     /// The light that was on.
     pub light: usize,
     /// How it was exposed, as far as camera or file say so.
@@ -56,9 +58,11 @@ pub fn preview(
 ) -> Result<Preview, ScanError> {
     let folder = tempfile::tempdir()
         .map_err(|source| crate::files::FileError::write(&std::env::temp_dir(), source))?;
-    let (look, settings) = test_shot(board, camera, output, wanted, folder.path())?;
+    let (frame, settings) = test_shot(board, camera, output, wanted, folder.path())?;
+    let look = Look::at(&frame);
     let better_exposure_s = better(settings.exposure_s, &look);
     Ok(Preview {
+        frame,
         advice: advice(settings, &look, better_exposure_s),
         light,
         settings,
@@ -104,7 +108,8 @@ pub(super) fn meter(
     let mut exposure_s = FIRST_S;
     for _ in 0..MOST_SHOTS {
         let wanted = Settings { exposure_s, iso };
-        let (look, settings) = test_shot(board, camera, output, wanted, folder)?;
+        let (frame, settings) = test_shot(board, camera, output, wanted, folder)?;
+        let look = Look::at(&frame);
         match next_exposure(settings.exposure_s, look.high()) {
             None => return Ok(settings),
             Some(next) => exposure_s = next,
@@ -141,7 +146,7 @@ fn test_shot(
     output: u8,
     wanted: Settings,
     folder: &Path,
-) -> Result<(Look, Settings), ScanError> {
+) -> Result<(Frame, Settings), ScanError> {
     board.light(output, None)?;
     let shot = shoot(board, camera, (wanted, &mut Told::default()), folder);
     board.off()?;
@@ -157,7 +162,7 @@ fn test_shot(
         exposure_s: of_file(frame.metadata.exposure_s, actual.exposure_s),
         iso: of_file(frame.metadata.iso, actual.iso),
     };
-    Ok((Look::at(&frame), settings))
+    Ok((frame, settings))
 }
 
 #[cfg(test)]

@@ -326,6 +326,7 @@ impl Run<'_> {
         let input = match self.store.keep(&self.plan, taken) {
             Ok(()) => {
                 self.judge.look_at(step, self.store.file(step));
+                self.tell_kept(step, settings);
                 Input::Kept
             }
             Err(error) => {
@@ -335,6 +336,13 @@ impl Run<'_> {
         };
         self.seconds.disk += begun.elapsed().as_secs_f64();
         input
+    }
+
+    fn tell_kept(&self, step: usize, settings: Settings) {
+        let Some(file) = self.store.file(step) else { return };
+        let planned = &self.plan.steps[step];
+        let (light, drift_check) = (planned.light, planned.drift_check);
+        (self.tell)(&Event::Kept { light, drift_check, file, settings });
     }
 
     /// How a frame was exposed, if it is a RAW file: as set, else as its file says. The first file of a camera that is set by hand sets the scan's

@@ -18,6 +18,17 @@ pub enum Event {
         /// Time left, once known.
         left: Option<Duration>,
     },
+    /// A frame is safe on disk.
+    Kept {
+        /// Its light; `None`: every LED off.
+        light: Option<usize>,
+        /// The first light again, to see drift.
+        drift_check: bool,
+        /// Where it is.
+        file: PathBuf,
+        /// How it was exposed.
+        settings: Settings,
+    },
     /// A frame is taken again.
     Again {
         /// As in "light 4".
