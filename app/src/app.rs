@@ -1,6 +1,6 @@
 //! The window as a whole: the rooms' rail, the room that is open, what is going on, what went wrong, and the keys.
 
-use crate::desk::{Activity, Desk};
+use crate::desk::{Activity, Brake, Desk};
 use crate::rooms::{
     Room, calibrate::Calibrate, look::Look, rig::Rig, scan::Scan, scans::Scans, welcome::Welcome,
 };
@@ -21,6 +21,8 @@ pub struct App {
     scan: Scan,
     look: Look,
     scans: Scans,
+    /// The room that was drawn last.
+    shown: Option<Room>,
 }
 
 impl App {
@@ -41,12 +43,28 @@ impl App {
             scan: Scan::default(),
             look: Look::default(),
             scans: Scans::default(),
+            shown: None,
         }
     }
 
     /// What all rooms share.
     pub fn desk(&self) -> &Desk {
         &self.desk
+    }
+
+    /// Leaves something to be done, as rooms do.
+    pub fn ask(&mut self, command: Command) {
+        self.desk.ask(command);
+    }
+
+    /// Opens a room.
+    pub fn enter(&mut self, room: Room) {
+        self.desk.go_to(room);
+    }
+
+    /// Whether nothing is going on and nothing is left to be done.
+    pub fn is_idle(&self) -> bool {
+        self.worker.is_idle() && !self.desk.is_busy() && !self.desk.has_asked()
     }
 
     fn hear(&mut self, update: Update) {
@@ -63,6 +81,9 @@ impl App {
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
+                self.scan.reset(desk);
+                self.scans.reset(desk);
+                self.rig.reset(desk);
             }
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),
@@ -70,6 +91,34 @@ impl App {
             Update::Look(told) => self.look.hear(told, desk),
             Update::Scans(told) => self.scans.hear(told, desk),
         }
+    }
+
+    fn hand_over(&mut self) {
+        for brake in self.desk.take_brakes() {
+            match brake {
+                Brake::Cancel => self.worker.brake.cancel(),
+                Brake::Pause => self.worker.brake.pause(),
+                Brake::GoOn => self.worker.brake.go_on(),
+            }
+        }
+        for command in self.desk.take_asked() {
+            self.worker.ask(command);
+        }
+    }
+
+    /// What a room does when it is left or entered.
+    fn rooms_change(&mut self) {
+        let open = self.desk.place.as_ref().map(|_| self.desk.settings.room);
+        if open == self.shown {
+            return;
+        }
+        if self.shown == Some(Room::Rig) {
+            self.rig.leave(&mut self.desk);
+        }
+        if open == Some(Room::Scans) {
+            self.scans.is_stale();
+        }
+        self.shown = open;
     }
 
     fn room(&mut self, ui: &mut egui::Ui) {
@@ -188,9 +237,8 @@ impl eframe::App for App {
         let updates: Vec<Update> = self.worker.updates().collect();
         updates.into_iter().for_each(|update| self.hear(update));
         self.keys(ctx);
-        for command in self.desk.take_asked() {
-            self.worker.ask(command);
-        }
+        self.rooms_change();
+        self.hand_over();
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
@@ -202,9 +250,7 @@ impl eframe::App for App {
         egui::CentralPanel::default().show(ui, |ui| self.room(ui));
         let size = ui.ctx().content_rect().size();
         self.desk.settings.window_size = [size.x, size.y];
-        for command in self.desk.take_asked() {
-            self.worker.ask(command);
-        }
+        self.hand_over();
     }
 
     fn on_exit(&mut self) {

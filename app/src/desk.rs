@@ -18,6 +18,18 @@ pub struct Desk {
     /// What went wrong and nobody has put away yet; the newest last.
     pub problems: Vec<Problem>,
     asked: Vec<Command>,
+    brakes: Vec<Brake>,
+}
+
+/// Acts at once on the work under way, past the queue of commands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Brake {
+    /// End it.
+    Cancel,
+    /// Let a scan rest.
+    Pause,
+    /// Go on with a scan.
+    GoOn,
 }
 
 /// Something that went wrong.
@@ -76,7 +88,14 @@ impl Activity {
 impl Desk {
     /// An empty desk.
     pub fn new(settings: Settings) -> Self {
-        Self { settings, place: None, activity: None, problems: Vec::new(), asked: Vec::new() }
+        Self {
+            settings,
+            place: None,
+            activity: None,
+            problems: Vec::new(),
+            asked: Vec::new(),
+            brakes: Vec::new(),
+        }
     }
 
     /// Leaves something to be done.
@@ -87,6 +106,21 @@ impl Desk {
     /// What was left to be done, once.
     pub fn take_asked(&mut self) -> Vec<Command> {
         std::mem::take(&mut self.asked)
+    }
+
+    /// Whether something is left that was not handed over yet.
+    pub fn has_asked(&self) -> bool {
+        !self.asked.is_empty()
+    }
+
+    /// Acts on the work under way.
+    pub fn brake(&mut self, brake: Brake) {
+        self.brakes.push(brake);
+    }
+
+    /// What is to act on the work under way, once.
+    pub fn take_brakes(&mut self) -> Vec<Brake> {
+        std::mem::take(&mut self.brakes)
     }
 
     /// Whether the worker has something to do that takes its time.

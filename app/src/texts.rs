@@ -71,8 +71,336 @@ pub mod welcome {
 
 /// The Rig room.
 pub mod rig {
+    use weavelight::doctor::LightBoard;
+    use weavelight::instrument::{CameraKind, RigCamera};
+
+    /// Where something needs a rig.
+    pub const NONE_OPEN: &str = "no rig is open; open one in the Rig room";
     /// The heading of problems when a rig is opened.
     pub const OPENING: &str = "Opening the rig";
     /// And when a simulated one is made.
     pub const MAKING_SIMULATED: &str = "Making the simulated rig";
+    /// The button.
+    pub const FIND: &str = "Look for board and camera";
+    /// What it does.
+    pub const FIND_HINT: &str = "Asks at the rig's port and at the camera; nothing is photographed";
+    /// Before that.
+    pub const NOT_LOOKED: &str = "Not looked for yet.";
+    /// Work.
+    pub const FINDING: &str = "Looking for board and camera";
+    /// Work.
+    pub const FINDING_BOARD: &str = "light board";
+    /// Work.
+    pub const FINDING_CAMERA: &str = "camera";
+    /// Work.
+    pub const LIGHTING: &str = "Switching the light";
+    /// Work.
+    pub const TESTING: &str = "Testing each light";
+    /// Back to the welcome.
+    pub const OTHER_RIG: &str = "Open another rig";
+    /// The heading.
+    pub const LIGHTS: &str = "Lights";
+    /// The button.
+    pub const TEST_EACH: &str = "Test each";
+    /// The button.
+    pub const ALL_OFF: &str = "All off";
+    /// How to.
+    pub const CLICK_A_LIGHT: &str =
+        "Click a light to switch it on; click it again to switch it off.";
+    /// Of the table.
+    pub const COLUMNS: [&str; 4] = ["Light", "Output", "Measured with a ruler", "Calibrated"];
+    /// In place of a place.
+    pub const FAR: &str = "far away";
+
+    /// Where everything lies.
+    pub fn folder(name: &str) -> String {
+        format!("Folder “{name}”")
+    }
+
+    /// From where the sketch is seen.
+    pub fn side(front: bool) -> &'static str {
+        if front { "From the front" } else { "From above" }
+    }
+
+    /// A light's name.
+    pub fn light(number: usize, lit: bool) -> String {
+        format!("Light {number}{}", if lit { ", on" } else { "" })
+    }
+
+    /// A place, millimetres.
+    pub fn place([x, y, z]: [f64; 3]) -> String {
+        format!("{x:.0}, {y:.0}, {z:.0} mm")
+    }
+
+    /// A calibrated place, if there is one.
+    pub fn calibrated(place_mm: Option<[f64; 3]>, sigma_mm: Option<f64>) -> String {
+        match (place_mm, sigma_mm) {
+            (Some([x, y, z]), Some(sigma)) => format!("{x:.1}, {y:.1}, {z:.1} ± {sigma:.1} mm"),
+            (Some([x, y, z]), None) => format!("{x:.1}, {y:.1}, {z:.1} mm"),
+            (None, _) => "not yet".to_owned(),
+        }
+    }
+
+    /// The camera in a line.
+    pub fn camera(camera: &RigCamera) -> String {
+        let kind = match camera.kind {
+            CameraKind::Simulated => "simulated",
+            CameraKind::Tethered { .. } => "tethered",
+            CameraKind::Watched { .. } => "watched folder",
+        };
+        let model = camera.model.as_deref().unwrap_or("camera");
+        format!("{model} ({kind}), {} × {} pixels", camera.width_px, camera.height_px)
+    }
+
+    /// A light board in a line.
+    pub fn board(board: &LightBoard) -> String {
+        let port = board.port.display();
+        match (&board.firmware, board.lights) {
+            (Some(firmware), Some(lights)) => {
+                format!("Light board at {port}: firmware {firmware}, {lights} lights")
+            }
+            _ => format!("{port}"),
+        }
+    }
+
+    /// The board of a simulated rig.
+    pub fn simulated_board(lights: usize) -> LightBoard {
+        LightBoard {
+            port: "the simulated port".into(),
+            firmware: Some("simulated".to_owned()),
+            lights: u8::try_from(lights).ok(),
+            back_light: false,
+            trigger: false,
+            problem: None,
+        }
+    }
+}
+
+/// The Scan room.
+pub mod scan {
+    use weavelight::device::scan::{Channel, Summary};
+    use weavelight::solution::Report;
+
+    /// Of the first swatch.
+    pub const FIRST_NAME: &str = "linen 1";
+    /// The fields.
+    pub const NAME: &str = "Name";
+    /// The swatch's.
+    pub const THICKNESS: &str = "Thickness";
+    /// Time.
+    pub const EXPOSURE: &str = "Exposure";
+    /// By test shots.
+    pub const FIND_EXPOSURE: &str = "find it";
+    /// Sensitivity.
+    pub const ISO: &str = "ISO";
+    /// Simulated rigs only.
+    pub const ON_THE_TABLE: &str = "On the table";
+    /// The button.
+    pub const TEST_SHOT: &str = "Test shot";
+    /// What it does.
+    pub const TEST_SHOT_HINT: &str =
+        "One picture under one light: exposure, focus, framing. Nothing is kept.";
+    /// Which.
+    pub const LIGHT: &str = "under light";
+    /// In the strip.
+    pub const LIGHT_NAME: &str = "Light";
+    /// In the strip.
+    pub const AMBIENT: &str = "Dark";
+    /// The group of settings.
+    pub const SOLVING: &str = "Solving";
+    /// Methods and what they do.
+    pub const METHODS: [(&str, &str); 3] = [
+        (
+            "Automatic",
+            "Weighted by the noise; shadows and highlights looked for where the residual asks for it",
+        ),
+        ("Least squares", "Plain: every unsaturated sample, all of equal weight"),
+        ("Robust everywhere", "Shadows and highlights looked for at every photosite"),
+    ];
+    /// As on the command line.
+    pub const UNDISTORT: &str = "Take out the lens's distortion";
+    /// As on the command line.
+    pub const NORMAL_Y_DOWN: &str = "Green points down (DirectX)";
+    /// The big button.
+    pub const SCAN: &str = "Scan the swatch";
+    /// Its key.
+    pub const SPACE: &str = "Space scans";
+    /// Why it is grey.
+    pub const TAKEN: &str = "A scan of this name is there already; choose another name";
+    /// While it runs.
+    pub const PAUSE: &str = "Pause";
+    /// While it rests.
+    pub const GO_ON: &str = "Continue";
+    /// Ends it.
+    pub const STOP: &str = "Stop";
+    /// What that means.
+    pub const STOP_HINT: &str = "Frames that are there stay; the scan can be continued later.";
+    /// Goes on with an unfinished scan.
+    pub const RESUME: &str = "Continue it";
+    /// Does not.
+    pub const LEAVE: &str = "Not now";
+    /// Opens the Look room.
+    pub const LOOK_CLOSER: &str = "Look closer";
+    /// Scans the same again.
+    pub const REPEAT: &str = "Scan again";
+    /// What becomes of the old one.
+    pub const REPEAT_HINT: &str = "The scan just taken goes to the bin";
+    /// Clears the table.
+    pub const NEXT: &str = "Next swatch";
+    /// Work.
+    pub const TAKING_TEST_SHOT: &str = "Test shot";
+    /// Work.
+    pub const METERING: &str = "finding the exposure";
+    /// Work.
+    pub const BOARD_LOST: &str = "the light board is gone; plug it in again";
+    /// Work.
+    pub const LAYING_OUT: &str = "Laying out the fabric";
+    /// Work.
+    pub const THROWING_AWAY: &str = "Moving the scan to the bin";
+    /// Layers of the preview.
+    pub const NORMALS: &str = "Normals";
+    /// Layers of the preview.
+    pub const ALBEDO: &str = "Albedo";
+    /// Of the test shot.
+    pub const MARK_CLIPPED: &str = "Mark what clips";
+    /// Of the test shot.
+    pub const HISTOGRAM: &str = "Histogram";
+    /// Of the test shot.
+    pub const FOCUS_HINT: &str =
+        "Larger is sharper: turn the focus ring and take another test shot";
+    /// The empty room.
+    pub const NOTHING_YET: &str = "Lay the swatch on the table and press Space";
+    /// The empty room.
+    pub const HOW_TO: &str =
+        "A test shot shows exposure and focus first. Maps appear here while the lights fire.";
+
+    /// Work.
+    pub fn scanning(name: &str) -> String {
+        format!("Scanning {name}")
+    }
+
+    /// Work.
+    pub fn solving(name: &str) -> String {
+        format!("Solving {name}")
+    }
+
+    /// A frame taken again.
+    pub fn again(why: &str) -> String {
+        format!("{why}; it is taken again")
+    }
+
+    /// A scan that was stopped.
+    pub fn unfinished(name: &str, frames: usize) -> String {
+        format!("“{name}” was stopped after {frames} frames. Continue where it stood?")
+    }
+
+    /// A frame's place in the strip, in words.
+    pub fn frame(name: &str, taking: bool, taken: bool) -> String {
+        let state = if taking {
+            "being taken"
+        } else if taken {
+            "taken"
+        } else {
+            "waiting"
+        };
+        format!("{name}, {state}")
+    }
+
+    /// A scan that is complete.
+    pub fn scanned(summary: &Summary) -> String {
+        let exposure =
+            summary.settings.map(|s| format!(" of {} s", s.exposure_s)).unwrap_or_default();
+        format!("{} frames{exposure} in {:.0} s", summary.frames, summary.seconds.total)
+    }
+
+    /// A solution.
+    pub fn solved(report: &Report) -> String {
+        let percent = |count: u64| 100.0 * count as f64 / report.pixels.max(1) as f64;
+        format!(
+            "{:.1} % solved from {} lights, {:.1} % robust, {:.1} % clipped",
+            percent(report.solved),
+            report.lights_used.len(),
+            percent(report.robust_pixels),
+            percent(report.saturated_pixels)
+        )
+    }
+
+    /// One line of the histogram.
+    pub fn channel(channel: &Channel) -> String {
+        format!(
+            "{}: brightest {:.0} %, clipped {:.2} %",
+            channel.name,
+            100.0 * channel.high.min(1.0),
+            100.0 * channel.clipped
+        )
+    }
+
+    /// The focus measure.
+    pub fn focus(sharpness: f64) -> String {
+        format!("Focus {sharpness:.4}")
+    }
+}
+
+/// The Scans room.
+pub mod scans {
+    use crate::rooms::scans::Entry;
+    use std::path::Path;
+
+    /// The field.
+    pub const SEARCH: &str = "Search by name";
+    /// The empty room.
+    pub const NONE: &str = "No scans yet";
+    /// The empty room.
+    pub const GO_SCAN: &str = "Scan the first swatch";
+    /// Into the Look room.
+    pub const OPEN: &str = "Open";
+    /// Where there is no solution.
+    pub const SOLVE: &str = "Solve";
+    /// Where there is one.
+    pub const SOLVE_AGAIN: &str = "Solve again";
+    /// Into the bin.
+    pub const DELETE: &str = "Delete";
+    /// What that means.
+    pub const DELETE_HINT: &str =
+        "Frames and maps go to the system's bin, from where they can be restored";
+    /// The field.
+    pub const EXPORT_TO: &str = "Export the maps to";
+    /// The button.
+    pub const EXPORT: &str = "Export";
+    /// Work.
+    pub const EXPORTING: &str = "Exporting";
+    /// Work.
+    pub const DELETING: &str = "Deleting the scan";
+
+    /// A search without result.
+    pub fn nothing_found(search: &str) -> String {
+        format!("No scan is called “{search}”")
+    }
+
+    /// Where maps went.
+    pub fn exported(to: &Path) -> String {
+        format!("Exported to {}", to.display())
+    }
+
+    /// Below a scan's name.
+    pub fn state(entry: &Entry) -> String {
+        match (entry.is_complete(), &entry.solution) {
+            (false, _) => {
+                format!("stopped after {} of {} frames", entry.frames[0], entry.frames[1])
+            }
+            (true, None) => "not solved yet".to_owned(),
+            (true, Some(_)) => "solved".to_owned(),
+        }
+    }
+
+    /// Beside the gallery.
+    pub fn details(entry: &Entry) -> Vec<(&'static str, String)> {
+        let captured = entry.captured.map(|when| when.strftime("%Y-%m-%d %H:%M UTC").to_string());
+        vec![
+            ("Taken", captured.unwrap_or_else(|| "unknown".to_owned())),
+            ("State", state(entry)),
+            ("Frames", format!("{} of {}", entry.frames[0], entry.frames[1])),
+            ("Folder", entry.folder.display().to_string()),
+        ]
+    }
 }

@@ -3,7 +3,7 @@
 use crate::desk::{Activity, Problem, Severity};
 use crate::texts;
 use crate::theme::meaning;
-use eframe::egui::{self, RichText};
+use eframe::egui::{self, Color32, RichText, vec2};
 
 /// A room's heading with a sentence below.
 pub fn heading(ui: &mut egui::Ui, title: &str, what: &str) {
@@ -37,14 +37,73 @@ pub fn activity(ui: &mut egui::Ui, activity: &Activity) -> bool {
     ui.button(texts::CANCEL).on_hover_text("Esc").clicked()
 }
 
+/// A shape that says the same as its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// A tick.
+    Good,
+    /// A cross.
+    Bad,
+    /// A triangle.
+    Warning,
+    /// A sun.
+    Lit,
+}
+
+impl Sign {
+    fn color(self) -> Color32 {
+        match self {
+            Sign::Good => meaning::GOOD,
+            Sign::Bad => meaning::BAD,
+            Sign::Warning => meaning::WARNING,
+            Sign::Lit => meaning::LIT,
+        }
+    }
+
+    /// Draws it around a place, `radius` points in size.
+    pub fn paint(self, painter: &egui::Painter, centre: egui::Pos2, radius: f32) {
+        let stroke = egui::Stroke::new(0.28 * radius + 0.6, self.color());
+        let at = |x: f32, y: f32| centre + radius * vec2(x, y);
+        match self {
+            Sign::Good => {
+                painter.line(vec![at(-0.8, 0.1), at(-0.2, 0.7), at(0.9, -0.7)], stroke);
+            }
+            Sign::Bad => {
+                painter.line_segment([at(-0.7, -0.7), at(0.7, 0.7)], stroke);
+                painter.line_segment([at(-0.7, 0.7), at(0.7, -0.7)], stroke);
+            }
+            Sign::Warning => {
+                let corners = vec![at(0.0, -0.9), at(0.95, 0.8), at(-0.95, 0.8)];
+                painter.add(egui::Shape::convex_polygon(corners, self.color(), egui::Stroke::NONE));
+                let dark = egui::Stroke::new(0.25 * radius, Color32::BLACK);
+                painter.line_segment([at(0.0, -0.3), at(0.0, 0.3)], dark);
+            }
+            Sign::Lit => {
+                painter.circle_filled(centre, 0.5 * radius, self.color());
+                for k in 0..8 {
+                    let (sin, cos) = (k as f32 * std::f32::consts::FRAC_PI_4).sin_cos();
+                    let ray = [at(0.7 * cos, 0.7 * sin), at(1.05 * cos, 1.05 * sin)];
+                    painter.line_segment(ray, egui::Stroke::new(1.2, self.color()));
+                }
+            }
+        }
+    }
+
+    /// Draws it in the line.
+    pub fn ui(self, ui: &mut egui::Ui) {
+        let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(18.0), egui::Sense::hover());
+        self.paint(ui.painter(), rect.center(), 7.0);
+    }
+}
+
 /// A problem with its remedy. True when it is put away.
 pub fn problem(ui: &mut egui::Ui, problem: &Problem) -> bool {
-    let (sign, color) = match problem.severity {
-        Severity::Error => ("✖", meaning::BAD),
-        Severity::Warning => ("⚠", meaning::WARNING),
+    let sign = match problem.severity {
+        Severity::Error => Sign::Bad,
+        Severity::Warning => Sign::Warning,
     };
     ui.horizontal_top(|ui| {
-        ui.label(RichText::new(sign).color(color).size(16.0));
+        sign.ui(ui);
         ui.vertical(|ui| {
             let title = match problem.severity {
                 Severity::Error => format!("{} {}", problem.title, texts::FAILED),

@@ -1,33 +1,128 @@
-//! The window's rooms, drawn and used.
+//! The window's rooms, drawn and used: the real worker, the real library, the simulated board and camera.
 
+mod desk;
+
+use desk::{Window, both_themes};
 use eframe::egui;
-use egui_kittest::{Harness, kittest::Queryable};
-use weavelight_app::{App, settings::Settings};
-
-fn window(folder: &std::path::Path, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    let mut settings = Settings::load_from(&folder.join("settings.toml"));
-    settings.home = folder.to_owned();
-    Harness::builder()
-        .with_size(size)
-        .with_theme(theme)
-        .with_max_steps(64)
-        .build_eframe(move |cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings))
-}
+use egui_kittest::kittest::Queryable;
+use weavelight_app::rooms::Room;
 
 #[test]
 fn a_first_start_offers_a_simulated_rig() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut window = window(folder.path(), [1280.0, 800.0], egui::Theme::Dark);
-    window.run();
-    window.get_by_label("Try it with a simulated rig").click();
-    for _ in 0..600 {
-        window.step();
-        if window.state().desk().place.is_some() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-    assert!(folder.path().join("simulated rig/rig.toml").exists());
-    window.run();
-    window.get_by_label("simulated rig");
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.harness.run();
+    window.click("Try it with a simulated rig");
+    window.until("the rig is open", |app| app.desk().place.is_some());
+    assert!(window.home().join("simulated rig/rig.toml").exists());
+    assert!(
+        !window.home().join("simulated rig/calibration").exists(),
+        "calibrating is the user's first task"
+    );
+}
+
+#[test]
+fn a_folder_without_a_rig_is_told_with_a_remedy() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.harness.run();
+    let field = window.harness.get_by_label("Folder of the rig");
+    field.focus();
+    field.type_text("/no/such/rig");
+    window.harness.run();
+    window.click("Open");
+    window.until("a problem is shown", |app| !app.desk().problems.is_empty());
+    window.harness.run();
+    window.click("Dismiss");
+    window.harness.run();
+    assert!(window.harness.state().desk().problems.is_empty());
+}
+
+#[test]
+fn welcome_looks_as_it_did() {
+    both_themes("welcome", |_| {});
+}
+
+#[test]
+fn the_rig_is_drawn_and_its_lights_are_lit() {
+    both_themes("rig", |window| {
+        window.open_small_rig();
+        window.enter(Room::Rig);
+        window.click("Light 3");
+        window.until_label("Light 3, on");
+        window.click("Look for board and camera");
+        window.idle();
+    });
+}
+
+#[test]
+fn a_scan_goes_from_click_to_maps() {
+    both_themes("scanned", |window| {
+        window.open_small_rig();
+        window.enter(Room::Scan);
+        window.click("Scan the swatch");
+        window.until_label("Look closer");
+        window.idle();
+        let home = window.rig();
+        assert!(home.join("scans/linen 1/session.toml").exists());
+        assert!(home.join("solutions/linen 1/normal.exr").exists());
+    });
+}
+
+#[test]
+fn a_test_shot_shows_exposure_and_focus() {
+    both_themes("test-shot", |window| {
+        window.open_small_rig();
+        window.enter(Room::Scan);
+        window.click("Test shot");
+        window.until_label("Mark what clips");
+        window.idle();
+    });
+}
+
+#[test]
+fn a_scan_that_was_stopped_is_offered_and_continued() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    window.click("Scan the swatch");
+    window.until_label("Light 2, taken");
+    window.click("Stop");
+    window.until_label("Continue it");
+    window.idle();
+    assert!(window.harness.state().desk().problems.is_empty(), "stopping is no fault");
+    window.click("Continue it");
+    window.until_label("Look closer");
+}
+
+#[test]
+fn a_fault_in_the_middle_is_told_and_the_scan_goes_on_later() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    window.click("Scan the swatch");
+    window.until_label("Light 1, taken");
+    // The disk goes away under the scan.
+    let scan = window.rig().join("scans/linen 1");
+    let aside = window.rig().join("aside");
+    std::fs::rename(&scan, &aside).unwrap();
+    window.until("a problem is shown", |app| !app.desk().problems.is_empty());
+    window.idle();
+    std::fs::rename(&aside, &scan).unwrap();
+    window.enter(Room::Rig);
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    window.until_label("Continue it");
+    window.click("Continue it");
+    window.until_label("Look closer");
+}
+
+#[test]
+fn scans_are_found_opened_exported_and_deleted() {
+    both_themes("scans", |window| {
+        window.open_small_rig();
+        window.scan_in_the_library("silk 12");
+        window.scan_in_the_library("wool 7");
+        window.enter(Room::Scans);
+        window.until_label("wool 7, not solved yet");
+        window.idle();
+    });
 }

@@ -118,7 +118,10 @@ impl Scene {
     }
 
     /// Writes it beside `rig.toml` in `folder`.
-    pub(super) fn save(&self, folder: &Path) -> Result<(), FileError> {
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
         write_toml(&folder.join(SCENE_FILE), &file_from_scene(self))
     }
 

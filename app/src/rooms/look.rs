@@ -6,7 +6,10 @@ use eframe::egui;
 
 /// What this room asks of the worker.
 #[derive(Debug)]
-pub enum Ask {}
+pub enum Ask {
+    /// A solution's folder.
+    Open(std::path::PathBuf),
+}
 
 /// What the worker tells this room.
 #[derive(Debug)]
@@ -30,5 +33,5 @@ impl Look {
 
 /// The worker's part.
 pub fn act(ask: Ask, _tools: &mut Tools, _out: &Outbox) {
-    match ask {}
+    let Ask::Open(_) = ask;
 }

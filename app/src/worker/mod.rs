@@ -3,6 +3,7 @@
 //! Work that the user no longer wants is ended by unwinding from its progress callback, as rust-analyzer ends its queries:
 //! the library's outputs appear only when whole, so nothing half-written stays.
 
+pub mod instruments;
 mod job;
 pub mod open;
 
@@ -13,6 +14,8 @@ use crate::place::Place;
 use crate::rooms::{calibrate, look, rig, scan, scans};
 use eframe::egui;
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::Duration;
 use weavelight::device::scan::Instruments;
@@ -82,6 +85,8 @@ pub struct Tools {
 pub struct Worker {
     commands: Sender<Command>,
     updates: Receiver<Update>,
+    /// Commands that are not done yet.
+    open: Arc<AtomicUsize>,
     /// Ends or pauses what is going on.
     pub brake: job::Brake,
 }
@@ -93,20 +98,29 @@ impl Worker {
         let (outbox, updates) = mpsc::channel();
         let brake = job::Brake::default();
         let out = Outbox::new(outbox, ctx, brake.clone());
+        let open = Arc::new(AtomicUsize::new(0));
+        let done = open.clone();
         std::thread::spawn(move || {
             let mut tools = Tools::default();
             for command in inbox {
                 out.begin();
                 act(command, &mut tools, &out);
+                done.fetch_sub(1, Ordering::SeqCst);
             }
         });
-        Self { commands, updates, brake }
+        Self { commands, updates, open, brake }
     }
 
     /// Hands over a command.
     pub fn ask(&self, command: Command) {
+        self.open.fetch_add(1, Ordering::SeqCst);
         // The thread lives as long as this value.
         let _ = self.commands.send(command);
+    }
+
+    /// Whether every command is done.
+    pub fn is_idle(&self) -> bool {
+        self.open.load(Ordering::SeqCst) == 0
     }
 
     /// What has happened since.

@@ -1,0 +1,214 @@
+//! The Rig room: board, camera, and the lights as a sketch seen from the side and from above; each can be lit.
+
+mod sketch;
+mod work;
+
+use crate::desk::Desk;
+use crate::texts::rig as texts;
+use crate::theme;
+use crate::widgets::{self, Sign};
+use crate::worker::{Command, Outbox, Tools};
+use eframe::egui::{self, RichText};
+use sketch::{Lamp, Side};
+use weavelight::device::scan::CameraFinding;
+use weavelight::doctor::LightBoard;
+use weavelight::instrument::{CalibratedLight, RigLightPlace};
+use weavelight_calibration::description::Light;
+
+/// What this room asks of the worker.
+#[derive(Debug)]
+pub enum Ask {
+    /// Look for board and camera.
+    Find,
+    /// Light one of the rig's lights; `None`: all off.
+    Light(Option<usize>),
+    /// One light after the other.
+    TestEach,
+    /// What the calibration says of the lights.
+    ReadCalibration,
+}
+
+/// What the worker tells this room.
+#[derive(Debug)]
+pub enum Told {
+    /// What was found.
+    Found {
+        /// Light boards, and ports without one.
+        boards: Vec<LightBoard>,
+        /// Cameras.
+        cameras: Vec<CameraFinding>,
+    },
+    /// What is lit now.
+    Lit(Option<usize>),
+    /// The calibrated lights; empty where there are none.
+    Lights(Vec<CalibratedLight>),
+}
+
+/// What this room keeps.
+#[derive(Debug, Default)]
+pub struct Rig {
+    found: Option<(Vec<LightBoard>, Vec<CameraFinding>)>,
+    lit: Option<usize>,
+    calibrated: Vec<CalibratedLight>,
+    asked: bool,
+}
+
+impl Rig {
+    /// Draws the room.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if !self.asked {
+            self.asked = true;
+            desk.ask(Command::Rig(Ask::ReadCalibration));
+        }
+        let pane = egui::Panel::left("rig parts").exact_size(320.0).resizable(false);
+        pane.show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| self.parts(ui, desk));
+        });
+        egui::CentralPanel::default().show(ui, |ui| self.lights(ui, desk));
+    }
+
+    fn parts(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some(place) = &desk.place else { return };
+        let name = place.rig.name.clone();
+        let folder = place.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let path = place.folder.display().to_string();
+        let camera = texts::camera(&place.rig.camera);
+        widgets::heading(ui, &name, "");
+        ui.label(RichText::new(texts::folder(&folder)).weak()).on_hover_text(path);
+        ui.label(camera);
+        ui.separator();
+        let find = egui::Button::new(texts::FIND);
+        if ui.add_enabled(!desk.is_busy(), find).on_hover_text(texts::FIND_HINT).clicked() {
+            desk.ask(Command::Rig(Ask::Find));
+        }
+        match &self.found {
+            None => {
+                ui.label(RichText::new(texts::NOT_LOOKED).weak());
+            }
+            Some((boards, cameras)) => {
+                boards
+                    .iter()
+                    .for_each(|board| finding(ui, &texts::board(board), board.problem.as_ref()));
+                cameras
+                    .iter()
+                    .for_each(|camera| finding(ui, &camera.what, camera.problem.as_ref()));
+            }
+        }
+        ui.separator();
+        if ui.button(texts::OTHER_RIG).clicked() {
+            desk.place = None;
+            desk.settings.rig = None;
+        }
+    }
+
+    fn lights(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some(place) = desk.place.clone() else { return };
+        let lamps = self.lamps(&place.rig);
+        ui.horizontal(|ui| {
+            ui.heading(texts::LIGHTS);
+            let free = !desk.is_busy();
+            if ui.add_enabled(free, egui::Button::new(texts::TEST_EACH)).clicked() {
+                desk.ask(Command::Rig(Ask::TestEach));
+            }
+            if ui.add_enabled(self.lit.is_some(), egui::Button::new(texts::ALL_OFF)).clicked() {
+                desk.ask(Command::Rig(Ask::Light(None)));
+            }
+        });
+        ui.label(RichText::new(texts::CLICK_A_LIGHT).weak());
+        let height_mm = place.rig.camera.height_mm.unwrap_or(600.0);
+        let room = ui.available_size();
+        let half = egui::vec2((room.x - theme::GAP) / 2.0, (room.y * 0.58).max(200.0));
+        let mut clicked = None;
+        ui.horizontal(|ui| {
+            for side in [Side::Front, Side::Above] {
+                let hit = sketch::ui(ui, half, side, &lamps, height_mm, self.lit);
+                clicked = clicked.or(hit);
+            }
+        });
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            clicked = clicked.or(self.table(ui, &lamps));
+        });
+        if let Some(light) = clicked.filter(|_| !desk.is_busy()) {
+            let wanted = (self.lit != Some(light)).then_some(light);
+            desk.ask(Command::Rig(Ask::Light(wanted)));
+        }
+    }
+
+    fn lamps(&self, rig: &weavelight::instrument::Rig) -> Vec<Lamp> {
+        let lamp = |(k, light): (usize, &weavelight::instrument::RigLight)| Lamp {
+            channel: rig.channel(k),
+            place_mm: match &light.place {
+                RigLightPlace::Point { position_mm, .. } => Some(position_mm.coords.into()),
+                RigLightPlace::Directional { .. } => None,
+            },
+            calibrated_mm: self.calibrated.get(k).and_then(|light| match &light.light {
+                Light::Point(point) => Some(point.position_mm.coords.into()),
+                Light::Directional(_) => None,
+            }),
+            sigma_mm: self.calibrated.get(k).and_then(|light| light.position_sigma_mm),
+        };
+        rig.lights.iter().enumerate().map(lamp).collect()
+    }
+
+    /// The same as a table. The light whose button was clicked.
+    fn table(&self, ui: &mut egui::Ui, lamps: &[Lamp]) -> Option<usize> {
+        let mut clicked = None;
+        egui::Grid::new("lights").striped(true).num_columns(4).min_col_width(90.0).show(ui, |ui| {
+            texts::COLUMNS.iter().for_each(|column| {
+                ui.label(RichText::new(*column).strong());
+            });
+            ui.end_row();
+            for (k, lamp) in lamps.iter().enumerate() {
+                let text = texts::light(k, self.lit == Some(k));
+                if ui.selectable_label(self.lit == Some(k), text).clicked() {
+                    clicked = Some(k);
+                }
+                ui.label(lamp.channel.to_string());
+                ui.label(lamp.place_mm.map_or(texts::FAR.to_owned(), texts::place));
+                ui.label(texts::calibrated(lamp.calibrated_mm, lamp.sigma_mm));
+                ui.end_row();
+            }
+        });
+        clicked
+    }
+
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, told: Told, _desk: &mut Desk) {
+        match told {
+            Told::Found { boards, cameras } => self.found = Some((boards, cameras)),
+            Told::Lit(light) => self.lit = light,
+            Told::Lights(lights) => self.calibrated = lights,
+        }
+    }
+
+    /// Another rig.
+    pub fn reset(&mut self, _desk: &mut Desk) {
+        *self = Self::default();
+    }
+
+    /// The room is left: nothing stays lit.
+    pub fn leave(&mut self, desk: &mut Desk) {
+        self.asked = false;
+        if self.lit.is_some() {
+            desk.ask(Command::Rig(Ask::Light(None)));
+        }
+    }
+}
+
+fn finding(ui: &mut egui::Ui, what: &str, problem: Option<&String>) {
+    let sign = if problem.is_some() { Sign::Bad } else { Sign::Good };
+    ui.horizontal_top(|ui| {
+        sign.ui(ui);
+        ui.vertical(|ui| {
+            ui.add(egui::Label::new(RichText::new(what).strong()).wrap());
+            if let Some(problem) = problem {
+                ui.add(egui::Label::new(problem).wrap());
+            }
+        });
+    });
+}
+
+/// The worker's part.
+pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    work::act(ask, tools, out);
+}

@@ -1,0 +1,103 @@
+//! What can be seen of a scan while it goes on: each frame made small, and the maps from the frames so far. A thread of its
+//! own, so that the next light does not wait for it; it ends with the scan.
+
+use super::Told;
+use super::picture::{Thumb, thumb};
+use crate::place::Place;
+use crate::worker::{Outbox, Update};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::JoinHandle;
+use weavelight::device::camera::Settings;
+use weavelight::instrument::Calibration;
+use weavelight::raw::{Frame, Hint, decode};
+use weavelight::session::{Kind, Session};
+use weavelight::solve::Exposure;
+use weavelight::solve::preview::{Accumulator, Scale};
+
+/// A frame that is safe.
+#[derive(Debug)]
+pub(super) struct Sight {
+    pub(super) light: Option<usize>,
+    pub(super) drift_check: bool,
+    pub(super) file: PathBuf,
+    pub(super) settings: Settings,
+}
+
+/// Looks at frames as they come.
+pub(super) struct Eyes {
+    sights: Option<Sender<Sight>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Preview maps have about so many columns: as many as the window shows.
+const COLUMNS: usize = 800;
+
+impl Eyes {
+    pub(super) fn open(place: &Place, folder: &Path, out: &Outbox) -> Self {
+        let (sights, inbox) = mpsc::channel();
+        let (place, folder, out) = (place.clone(), folder.to_owned(), out.clone());
+        let thread = std::thread::spawn(move || watch(&inbox, &place, &folder, &out));
+        Self { sights: Some(sights), thread: Some(thread) }
+    }
+
+    pub(super) fn look_at(&self, sight: Sight) {
+        // A thread that stumbled over a frame leaves the scan alone.
+        let _ = self.sights.as_ref().map(|sights| sights.send(sight));
+    }
+}
+
+impl Drop for Eyes {
+    fn drop(&mut self) {
+        self.sights = None;
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+fn watch(inbox: &Receiver<Sight>, place: &Place, folder: &Path, out: &Outbox) {
+    let calibration = Calibration::load(&place.calibration()).ok();
+    let mut sums: Option<Accumulator> = None;
+    for sight in inbox {
+        let Some(frame) = read(&sight.file) else { continue };
+        let picture = thumb(&frame, sight.light, calibration.as_ref());
+        let (light, drift_check) = (sight.light, sight.drift_check);
+        out.tell(Update::Scan(Told::Frame(Box::new(Thumb { light, drift_check, picture }))));
+        let Some(calibration) = &calibration else { continue };
+        let sums = sums.get_or_insert_with(|| accumulator(calibration, folder, &frame));
+        if !drift_check && add(sums, sight, frame).is_some() {
+            tell_preview(sums, out);
+        }
+    }
+}
+
+fn read(file: &Path) -> Option<Frame> {
+    decode(&std::fs::read(file).ok()?, &Hint::default()).ok()
+}
+
+fn accumulator(calibration: &Calibration, folder: &Path, like: &Frame) -> Accumulator {
+    let plane = Session::load(folder).map(|session| session.plane_or_table());
+    let plane = plane.unwrap_or_else(|_| Session::new(folder, Kind::Swatch, "").plane_or_table());
+    let scale = match like.width.div_ceil(COLUMNS) {
+        0..2 => Scale::Full,
+        2..3 => Scale::Half,
+        3..6 => Scale::Quarter,
+        _ => Scale::Eighth,
+    };
+    Accumulator::new(calibration.clone(), plane, like, scale)
+}
+
+/// What does not fit is told by the solve, with its remedy.
+fn add(sums: &mut Accumulator, sight: Sight, frame: Frame) -> Option<()> {
+    let Settings { exposure_s, iso } = sight.settings;
+    let exposure = Exposure { frame, exposure_s, iso, path: sight.file };
+    match sight.light {
+        Some(light) => sums.add(light, exposure).ok(),
+        None => sums.add_ambient(exposure).ok(),
+    }
+}
+
+fn tell_preview(sums: &Accumulator, out: &Outbox) {
+    if let Ok(Some(preview)) = sums.preview() {
+        out.tell(Update::Scan(Told::Preview(Box::new(preview))));
+    }
+}

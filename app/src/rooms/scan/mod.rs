@@ -1,0 +1,291 @@
+//! The Scan room, the daily loop: name, one big button, a strip that fills light by light, maps while later lights still fire,
+//! and a solution at the end.
+
+mod eyes;
+mod form;
+mod histogram;
+pub mod picture;
+mod strip;
+mod view;
+mod work;
+
+pub use picture::Thumb;
+
+use crate::desk::Desk;
+use crate::rooms::{Room, look};
+use crate::settings::SolveSettings;
+use crate::worker::{Command, Outbox, Tools};
+use crate::{texts::scan as texts, theme};
+use eframe::egui;
+use form::Form;
+use std::path::PathBuf;
+use strip::Strip;
+use view::View;
+use weavelight::device::camera::Settings;
+use weavelight::device::scan::{Preview, Summary};
+use weavelight::solution::Report;
+use weavelight_sim::cloth::Preset;
+
+/// What this room asks of the worker.
+#[derive(Debug)]
+pub enum Ask {
+    /// A picture under one light.
+    TestShot {
+        /// The rig's light.
+        light: usize,
+        /// Exposure.
+        settings: Settings,
+    },
+    /// A scan, and its solution.
+    Scan(Order),
+    /// A solution.
+    Solve {
+        /// The capture session's folder.
+        scan: PathBuf,
+        /// How.
+        settings: SolveSettings,
+    },
+    /// Another fabric on the simulated table.
+    LayOut(Preset),
+    /// Whether there is a scan that was stopped.
+    LookForUnfinished,
+    /// A scan into the system's bin.
+    ThrowAway(PathBuf),
+}
+
+/// What to scan and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Order {
+    /// Of the swatch.
+    pub name: String,
+    /// Of the swatch, millimetres.
+    pub thickness_mm: Option<f64>,
+    /// `None`: to be found.
+    pub exposure_s: Option<f64>,
+    /// Sensitivity.
+    pub iso: f64,
+    /// Go on with what is there.
+    pub resume: bool,
+    /// How to solve it.
+    pub solve: SolveSettings,
+}
+
+/// What the worker tells this room.
+#[derive(Debug)]
+pub enum Told {
+    /// A test shot.
+    TestShot(Box<Preview>),
+    /// The frame that is being taken, as in "light 4".
+    Taking(String),
+    /// It rests.
+    Paused,
+    /// A frame that is safe.
+    Frame(Box<Thumb>),
+    /// Maps from the frames so far.
+    Preview(Box<weavelight::solve::preview::Preview>),
+    /// All frames are there.
+    Complete(Box<Summary>),
+    /// The solution stands.
+    Solved {
+        /// Its folder.
+        solution: PathBuf,
+        /// What it says of itself.
+        report: Box<Report>,
+    },
+    /// Name and frames of a scan that was stopped, if there is one.
+    Unfinished(Option<(String, usize)>),
+}
+
+/// Where a scan stands.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) enum Stage {
+    /// Nothing is going on.
+    #[default]
+    Ready,
+    /// Frames are being taken.
+    Scanning,
+    /// It rests.
+    Paused,
+    /// Frames are there, maps not yet, or not to be had.
+    Scanned(Box<Summary>),
+    /// Maps are there.
+    Solved { solution: PathBuf, report: Box<Report> },
+}
+
+/// What this room keeps.
+#[derive(Debug, Default)]
+pub struct Scan {
+    form: Form,
+    stage: Stage,
+    strip: Strip,
+    view: View,
+    unfinished: Option<(String, usize)>,
+}
+
+impl Scan {
+    /// Draws the room.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        self.keys(ui, desk);
+        let pane = egui::Panel::left("scan form").exact_size(292.0).resizable(false);
+        pane.show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
+        });
+        let lights = desk.place.as_ref().map_or(0, |place| place.rig.lights.len());
+        egui::Panel::bottom("scan strip").exact_size(strip::HEIGHT).show(ui, |ui| {
+            self.strip.ui(ui, lights);
+        });
+        egui::CentralPanel::default().show(ui, |ui| {
+            self.result(ui, desk);
+            self.view.ui(ui);
+        });
+    }
+
+    fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.heading(crate::texts::rooms::SCAN);
+        self.offer_unfinished(ui, desk);
+        let running = matches!(self.stage, Stage::Scanning | Stage::Paused);
+        ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
+        ui.add_space(theme::WIDE_GAP);
+        if running {
+            self.running(ui, desk);
+        } else if self.form.button(ui, desk) {
+            self.begin(self.form.order(desk, false), desk);
+        }
+    }
+
+    fn running(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.horizontal(|ui| {
+            let paused = self.stage == Stage::Paused;
+            let size = egui::vec2(120.0, theme::BIG);
+            let text = if paused { texts::GO_ON } else { texts::PAUSE };
+            if ui.add(egui::Button::new(text).min_size(size)).clicked() {
+                desk.brake(if paused {
+                    crate::desk::Brake::GoOn
+                } else {
+                    crate::desk::Brake::Pause
+                });
+                self.stage = Stage::Scanning;
+            }
+            if ui.add(egui::Button::new(texts::STOP).min_size(size)).clicked() {
+                desk.brake(crate::desk::Brake::Cancel);
+            }
+        });
+        ui.label(egui::RichText::new(texts::STOP_HINT).small().weak());
+    }
+
+    /// A scan that was stopped by whatever, first thing to be seen.
+    fn offer_unfinished(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some((name, frames)) = self.unfinished.clone().filter(|_| !desk.is_busy()) else {
+            return;
+        };
+        let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
+        frame.show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.label(egui::RichText::new(texts::unfinished(&name, frames)).strong());
+            ui.horizontal(|ui| {
+                if ui.button(texts::RESUME).clicked() {
+                    self.form.name = name.clone();
+                    self.begin(self.form.order(desk, true), desk);
+                }
+                if ui.button(texts::LEAVE).clicked() {
+                    self.unfinished = None;
+                }
+            });
+        });
+        ui.add_space(theme::GAP);
+    }
+
+    fn begin(&mut self, order: Order, desk: &mut Desk) {
+        self.stage = Stage::Scanning;
+        self.unfinished = None;
+        if !order.resume {
+            self.strip = Strip::default();
+        }
+        self.view.begin();
+        desk.ask(Command::Scan(Ask::Scan(order)));
+    }
+
+    /// What came of the scan, and what to do with it.
+    fn result(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let text = match &self.stage {
+            Stage::Scanned(summary) => texts::scanned(summary),
+            Stage::Solved { report, .. } => texts::solved(report),
+            _ => return,
+        };
+        let name = self.form.name.clone();
+        ui.horizontal_wrapped(|ui| {
+            ui.label(egui::RichText::new(text).strong());
+            if let Stage::Solved { solution, .. } = &self.stage
+                && ui.button(texts::LOOK_CLOSER).clicked()
+            {
+                desk.ask(Command::Look(look::Ask::Open(solution.clone())));
+                desk.go_to(Room::Look);
+            }
+            if !desk.is_busy()
+                && ui.button(texts::REPEAT).on_hover_text(texts::REPEAT_HINT).clicked()
+            {
+                if let Some(place) = &desk.place {
+                    let scan = place.scan(&name);
+                    desk.ask(Command::Scan(Ask::ThrowAway(scan)));
+                }
+                self.begin(self.form.order(desk, false), desk);
+            } else if !desk.is_busy() && ui.button(texts::NEXT).clicked() {
+                self.form.next_name();
+                self.stage = Stage::Ready;
+                self.strip = Strip::default();
+                self.view.begin();
+            }
+        });
+    }
+
+    /// Space scans, wherever no text is being written.
+    fn keys(&mut self, ui: &egui::Ui, desk: &mut Desk) {
+        let free = !ui.ctx().egui_wants_keyboard_input();
+        let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
+        if space && self.stage == Stage::Ready && self.form.can_begin(desk) {
+            self.begin(self.form.order(desk, false), desk);
+        }
+    }
+
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
+        match told {
+            Told::TestShot(shot) => {
+                self.form.hear(&shot);
+                self.view.show_test_shot(shot);
+            }
+            Told::Taking(frame) => {
+                self.stage = Stage::Scanning;
+                self.strip.taking(frame);
+            }
+            Told::Paused => self.stage = Stage::Paused,
+            Told::Frame(thumb) => self.strip.add(*thumb),
+            Told::Preview(preview) => self.view.show_preview(&preview),
+            Told::Complete(summary) => {
+                self.form.keep_exposure(&summary);
+                self.strip.done();
+                self.stage = Stage::Scanned(summary);
+            }
+            Told::Solved { solution, report } => self.stage = Stage::Solved { solution, report },
+            Told::Unfinished(found) => {
+                if matches!(self.stage, Stage::Scanning | Stage::Paused) {
+                    self.stage = Stage::Ready;
+                    self.strip.done();
+                }
+                self.unfinished = found;
+            }
+        }
+        let _ = desk;
+    }
+
+    /// Another rig: nothing of the last one stays.
+    pub fn reset(&mut self, desk: &mut Desk) {
+        *self = Self::default();
+        desk.ask(Command::Scan(Ask::LookForUnfinished));
+    }
+}
+
+/// The worker's part.
+pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    work::act(ask, tools, out);
+}

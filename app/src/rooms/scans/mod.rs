@@ -1,0 +1,271 @@
+//! The Scans room: what was captured, newest first; search, open, solve again, export, delete to the bin.
+
+mod list;
+mod work;
+
+pub use list::{Entry, incomplete};
+
+use crate::desk::Desk;
+use crate::rooms::{Room, look, scan};
+use crate::worker::{Command, Outbox, Tools};
+use crate::{texts::scans as texts, theme, widgets};
+use eframe::egui::{self, ColorImage, RichText, Sense, TextureHandle, TextureOptions, vec2};
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// What this room asks of the worker.
+#[derive(Debug)]
+pub enum Ask {
+    /// What there is.
+    List,
+    /// The picture of a scan.
+    Thumbnail(PathBuf),
+    /// A scan and its solution into the system's bin.
+    Delete(Entry),
+    /// A copy of a solution.
+    Export {
+        /// The solution.
+        solution: PathBuf,
+        /// The folder to make.
+        to: PathBuf,
+    },
+}
+
+/// What the worker tells this room.
+#[derive(Debug)]
+pub enum Told {
+    /// What there is.
+    List(Vec<Entry>),
+    /// The picture of a scan.
+    Thumbnail(PathBuf, ColorImage),
+    /// A solution was copied here.
+    Exported(PathBuf),
+}
+
+/// Width of a card, points.
+const CARD: f32 = 208.0;
+/// Height of a card's picture, points.
+const PICTURE: f32 = 128.0;
+
+/// What this room keeps.
+#[derive(Default)]
+pub struct Scans {
+    entries: Vec<Entry>,
+    search: String,
+    chosen: Option<PathBuf>,
+    pictures: HashMap<PathBuf, Picture>,
+    export_to: String,
+    said: Option<String>,
+    /// Whether the list is as the folder was when the room was entered.
+    fresh: bool,
+}
+
+enum Picture {
+    Asked,
+    Here(ColorImage),
+    Loaded(TextureHandle),
+}
+
+impl std::fmt::Debug for Scans {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scans").field("entries", &self.entries.len()).finish_non_exhaustive()
+    }
+}
+
+impl Scans {
+    /// Draws the room.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if !self.fresh {
+            self.fresh = true;
+            desk.ask(Command::Scans(Ask::List));
+        }
+        let chosen = self.chosen.as_ref().and_then(|path| self.entry(path)).cloned();
+        if let Some(entry) = chosen {
+            let pane = egui::Panel::right("scan details").exact_size(280.0).resizable(false);
+            pane.show(ui, |ui| self.details(ui, &entry, desk));
+        }
+        egui::CentralPanel::default().show(ui, |ui| self.gallery(ui, desk));
+    }
+
+    fn entry(&self, path: &PathBuf) -> Option<&Entry> {
+        self.entries.iter().find(|entry| entry.folder == *path)
+    }
+
+    fn gallery(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.horizontal(|ui| {
+            ui.heading(crate::texts::rooms::SCANS);
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let hint = egui::TextEdit::singleline(&mut self.search).hint_text(texts::SEARCH);
+                ui.add(hint.desired_width(220.0)).on_hover_text(texts::SEARCH);
+            });
+        });
+        if self.entries.is_empty() {
+            if widgets::empty(ui, texts::NONE, texts::GO_SCAN) {
+                desk.go_to(Room::Scan);
+            }
+            return;
+        }
+        let wanted = self.search.to_lowercase();
+        let found: Vec<Entry> = self
+            .entries
+            .iter()
+            .filter(|e| e.name.to_lowercase().contains(&wanted))
+            .cloned()
+            .collect();
+        if found.is_empty() {
+            ui.label(texts::nothing_found(&self.search));
+        }
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.spacing_mut().item_spacing = vec2(theme::WIDE_GAP, theme::WIDE_GAP);
+                found.iter().for_each(|entry| self.card(ui, entry, desk));
+            });
+        });
+    }
+
+    fn card(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+        let (rect, response) = ui.allocate_exact_size(vec2(CARD, PICTURE + 44.0), Sense::click());
+        let label = format!("{}, {}", entry.name, texts::state(entry));
+        let info = || egui::WidgetInfo::labeled(egui::Role::Button, true, label.clone());
+        response.widget_info(info);
+        if !ui.is_rect_visible(rect) {
+            return;
+        }
+        let chosen = self.chosen.as_ref() == Some(&entry.folder);
+        let visuals = ui.visuals().clone();
+        let fill = if chosen { visuals.selection.bg_fill } else { visuals.faint_bg_color };
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 6.0, fill);
+        let picture = egui::Rect::from_min_size(rect.min, vec2(CARD, PICTURE)).shrink(4.0);
+        painter.rect_filled(picture, 4.0, visuals.extreme_bg_color);
+        if let Some(texture) = self.texture(ui.ctx(), entry, desk) {
+            let scale = (picture.size() / texture.size_vec2()).min_elem();
+            let place = egui::Rect::from_center_size(picture.center(), texture.size_vec2() * scale);
+            let all = egui::Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
+            painter.image(texture.id(), place, all, egui::Color32::WHITE);
+        }
+        let at = |dy: f32| egui::pos2(rect.left() + 8.0, picture.bottom() + dy);
+        let text = |at, text: &str, size: f32, color| {
+            painter.text(at, egui::Align2::LEFT_TOP, text, egui::FontId::proportional(size), color)
+        };
+        text(at(4.0), &entry.name, 14.0, visuals.text_color());
+        text(at(23.0), &texts::state(entry), 12.0, visuals.weak_text_color());
+        if response.double_clicked() {
+            open(entry, desk);
+        } else if response.clicked() {
+            self.chosen = Some(entry.folder.clone());
+            self.export_to.clear();
+            self.said = None;
+        }
+    }
+
+    fn texture(
+        &mut self,
+        ctx: &egui::Context,
+        entry: &Entry,
+        desk: &mut Desk,
+    ) -> Option<TextureHandle> {
+        let picture = self.pictures.entry(entry.folder.clone()).or_insert_with(|| {
+            desk.ask(Command::Scans(Ask::Thumbnail(entry.folder.clone())));
+            Picture::Asked
+        });
+        if let Picture::Here(image) = picture {
+            let texture = ctx.load_texture(&entry.name, image.clone(), TextureOptions::LINEAR);
+            *picture = Picture::Loaded(texture);
+        }
+        match picture {
+            Picture::Loaded(texture) => Some(texture.clone()),
+            _ => None,
+        }
+    }
+
+    fn details(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+        ui.heading(&entry.name);
+        egui::Grid::new("details").num_columns(2).show(ui, |ui| {
+            for (what, value) in texts::details(entry) {
+                ui.label(RichText::new(what).weak());
+                ui.add(egui::Label::new(value).wrap());
+                ui.end_row();
+            }
+        });
+        ui.separator();
+        ui.with_layout(egui::Layout::top_down_justified(egui::Align::Min), |ui| {
+            let idle = !desk.is_busy();
+            if ui.add_enabled(entry.solution.is_some(), egui::Button::new(texts::OPEN)).clicked() {
+                open(entry, desk);
+            }
+            let again = if entry.solution.is_some() { texts::SOLVE_AGAIN } else { texts::SOLVE };
+            if ui.add_enabled(idle && entry.is_complete(), egui::Button::new(again)).clicked() {
+                let (scan, settings) = (entry.folder.clone(), desk.settings.solve);
+                desk.ask(Command::Scan(scan::Ask::Solve { scan, settings }));
+                desk.ask(Command::Scans(Ask::List));
+            }
+            let delete = egui::Button::new(texts::DELETE);
+            if ui.add_enabled(idle, delete).on_hover_text(texts::DELETE_HINT).clicked() {
+                desk.ask(Command::Scans(Ask::Delete(entry.clone())));
+                self.chosen = None;
+            }
+        });
+        if let Some(solution) = &entry.solution {
+            ui.separator();
+            self.export(ui, solution.clone(), entry, desk);
+        }
+    }
+
+    fn export(&mut self, ui: &mut egui::Ui, solution: PathBuf, entry: &Entry, desk: &mut Desk) {
+        if self.export_to.is_empty() {
+            let folder = format!("{} maps", entry.name);
+            self.export_to = desk.settings.home.join("exports").join(folder).display().to_string();
+        }
+        let label = ui.label(texts::EXPORT_TO);
+        let field = egui::TextEdit::singleline(&mut self.export_to).desired_width(f32::INFINITY);
+        ui.add(field).labelled_by(label.id);
+        ui.horizontal(|ui| {
+            if ui.button(crate::texts::welcome::BROWSE).clicked()
+                && let Some(folder) = rfd::FileDialog::new().pick_folder()
+            {
+                self.export_to = folder.join(format!("{} maps", entry.name)).display().to_string();
+            }
+            if ui.add_enabled(!desk.is_busy(), egui::Button::new(texts::EXPORT)).clicked() {
+                let to = PathBuf::from(self.export_to.trim());
+                desk.ask(Command::Scans(Ask::Export { solution, to }));
+            }
+        });
+        if let Some(said) = &self.said {
+            ui.label(said);
+        }
+    }
+
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, told: Told, _desk: &mut Desk) {
+        match told {
+            Told::List(entries) => self.entries = entries,
+            Told::Thumbnail(folder, picture) => {
+                self.pictures.insert(folder, Picture::Here(picture));
+            }
+            Told::Exported(to) => self.said = Some(texts::exported(&to)),
+        }
+    }
+
+    /// Another rig, or another set of scans.
+    pub fn reset(&mut self, _desk: &mut Desk) {
+        *self = Self::default();
+    }
+
+    /// The list may have changed.
+    pub fn is_stale(&mut self) {
+        self.fresh = false;
+    }
+}
+
+fn open(entry: &Entry, desk: &mut Desk) {
+    if let Some(solution) = &entry.solution {
+        desk.ask(Command::Look(look::Ask::Open(solution.clone())));
+        desk.go_to(Room::Look);
+    }
+}
+
+/// The worker's part.
+pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    work::act(ask, tools, out);
+}

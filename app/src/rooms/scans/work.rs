@@ -1,0 +1,93 @@
+//! The worker's part of the Scans room.
+
+use super::list::list;
+use super::{Ask, Entry, Told};
+use crate::place::Place;
+use crate::rooms::scan::picture::thumb;
+use crate::texts::scans as texts;
+use crate::worker::{Outbox, Tools, Update};
+use eframe::egui::ColorImage;
+use std::path::{Path, PathBuf};
+use weavelight::files::{FileError, StagedFolder};
+use weavelight::instrument::Calibration;
+use weavelight::raw::{Hint, decode};
+use weavelight::session::Session;
+use weavelight::solution::OUTPUT;
+
+pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    let Some(place) = &tools.place else { return };
+    match ask {
+        Ask::List => out.tell(Update::Scans(Told::List(list(place)))),
+        Ask::Thumbnail(folder) => {
+            if let Some(picture) = thumbnail(place, &folder) {
+                out.tell(Update::Scans(Told::Thumbnail(folder, picture)));
+            }
+        }
+        Ask::Delete(entry) => delete(&entry, place, out),
+        Ask::Export { solution, to } => export(&solution, &to, out),
+    }
+}
+
+/// The first light's frame made small; kept as a file beside the scans, for the next time.
+fn thumbnail(place: &Place, folder: &Path) -> Option<ColorImage> {
+    let kept = kept_thumbnail(place, folder);
+    if let Ok(picture) = image::open(&kept) {
+        let rgb = picture.to_rgb8();
+        let size = [rgb.width() as usize, rgb.height() as usize];
+        return Some(ColorImage::from_rgb(size, rgb.as_raw()));
+    }
+    let session = Session::load(folder).ok()?;
+    let entry = session.frames.iter().find(|frame| frame.light.is_some())?;
+    let frame = decode(&session.read_frame(entry).ok()?, &Hint::default()).ok()?;
+    let calibration = Calibration::load(&place.calibration()).ok();
+    let picture = thumb(&frame, entry.light, calibration.as_ref());
+    keep(&picture, &kept);
+    Some(picture)
+}
+
+/// By the folder's name and age: a scan that was taken again has another picture.
+fn kept_thumbnail(place: &Place, folder: &Path) -> PathBuf {
+    let modified = folder.metadata().and_then(|metadata| metadata.modified()).ok();
+    let since = modified.and_then(|when| when.duration_since(std::time::UNIX_EPOCH).ok());
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let file = format!("{name}.{}.png", since.unwrap_or_default().as_millis());
+    place.folder.join(".thumbnails").join(file)
+}
+
+/// A thumbnail that cannot be kept is made again.
+fn keep(picture: &ColorImage, file: &Path) {
+    let rgb = picture.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
+    let [width, height] = picture.size.map(|side| u32::try_from(side).unwrap_or(0));
+    let _ = file.parent().map(std::fs::create_dir_all);
+    let _ = image::RgbImage::from_raw(width, height, rgb).map(|image| image.save(file));
+}
+
+fn delete(entry: &Entry, place: &Place, out: &Outbox) {
+    let folders = std::iter::once(&entry.folder).chain(&entry.solution);
+    if let Err(error) = trash::delete_all(folders) {
+        out.fail(texts::DELETING, &format!("{}: {error}", entry.folder.display()));
+    }
+    out.tell(Update::Scans(Told::List(list(place))));
+}
+
+/// Copies a solution; it stands under its name only when whole.
+fn export(solution: &Path, to: &Path, out: &Outbox) {
+    let copied = out.job(texts::EXPORTING, || -> Result<(), FileError> {
+        let staged = StagedFolder::create(to, OUTPUT)?;
+        let files: Vec<PathBuf> = std::fs::read_dir(solution)
+            .map_err(|source| FileError::read(solution, source))?
+            .flatten()
+            .map(|entry| entry.path())
+            .collect();
+        for (k, file) in files.iter().enumerate() {
+            let name = file.file_name().unwrap_or_default();
+            out.tick(k as f64 / files.len() as f64, &name.to_string_lossy());
+            let target = staged.path().join(name);
+            std::fs::copy(file, &target).map_err(|source| FileError::write(&target, source))?;
+        }
+        staged.commit()
+    });
+    if copied.is_ok() {
+        out.tell(Update::Scans(Told::Exported(to.to_owned())));
+    }
+}

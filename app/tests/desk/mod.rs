@@ -1,0 +1,144 @@
+//! A window in a test, with a home of its own and a small simulated rig.
+
+use eframe::egui;
+use egui_kittest::{Harness, SnapshotResults, kittest::Queryable};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use weavelight::simulate;
+use weavelight_app::{App, rooms::Room, settings::Settings, worker::Command};
+
+/// The size that most have.
+pub const WIDE: [f32; 2] = [1280.0, 800.0];
+/// A small laptop's.
+pub const SMALL: [f32; 2] = [960.0, 640.0];
+/// Work on small frames takes seconds; on a machine with much else to do, longer.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// Small enough for a test, large enough for a calibrated camera.
+const FRAME: [usize; 2] = [96, 64];
+
+pub struct Window {
+    pub harness: Harness<'static, App>,
+    home: tempfile::TempDir,
+}
+
+impl Window {
+    pub fn new(size: [f32; 2], theme: egui::Theme) -> Self {
+        let home = tempfile::tempdir().unwrap();
+        let mut settings = Settings::load_from(&home.path().join("settings.toml"));
+        settings.home = home.path().to_owned();
+        settings.theme = match theme {
+            egui::Theme::Dark => weavelight_app::settings::Theme::Dark,
+            egui::Theme::Light => weavelight_app::settings::Theme::Light,
+        };
+        let harness = Harness::builder()
+            .with_size(size)
+            .with_max_steps(64)
+            .build_eframe(|cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings));
+        Self { harness, home }
+    }
+
+    pub fn home(&self) -> PathBuf {
+        self.home.path().to_owned()
+    }
+
+    /// The small rig's folder.
+    pub fn rig(&self) -> PathBuf {
+        self.home().join("rig")
+    }
+
+    /// Makes the small rig, with its true calibration, where there is none yet, and opens it.
+    pub fn open_small_rig(&mut self) {
+        let rig = self.rig();
+        if !rig.exists() {
+            let options = simulate::Options {
+                out: rig.clone(),
+                size_px: Some(FRAME),
+                only: vec![simulate::Part::Swatch],
+                ..Default::default()
+            };
+            simulate::run(&options, &|_, _| ()).unwrap();
+        }
+        self.harness.state_mut().ask(Command::Open(rig));
+        self.until("the rig is open", |app| app.desk().place.is_some());
+        self.idle();
+    }
+
+    /// A scan as the simulator writes it.
+    pub fn scan_in_the_library(&mut self, name: &str) {
+        let to = self.rig().join("scans").join(name);
+        std::fs::create_dir_all(&to).unwrap();
+        for file in std::fs::read_dir(self.rig().join("swatch")).unwrap().flatten() {
+            std::fs::copy(file.path(), to.join(file.file_name())).unwrap();
+        }
+        let manifest = to.join("session.toml");
+        let text = std::fs::read_to_string(&manifest).unwrap();
+        let renamed = text.lines().map(|line| match line.starts_with("name = ") {
+            true => format!("name = \"{name}\"\n"),
+            false => format!("{line}\n"),
+        });
+        std::fs::write(&manifest, renamed.collect::<String>()).unwrap();
+    }
+
+    pub fn enter(&mut self, room: Room) {
+        self.harness.state_mut().enter(room);
+        self.harness.run();
+    }
+
+    pub fn click(&mut self, label: &str) {
+        self.until_label(label);
+        self.harness.get_by_label(label).click();
+        self.harness.step();
+    }
+
+    /// Waits for something with this name.
+    pub fn until_label(&mut self, label: &str) {
+        let begun = Instant::now();
+        while self.harness.query_by_label(label).is_none() {
+            assert!(begun.elapsed() < PATIENCE, "no {label:?}; {:?}", self.harness.state().desk());
+            self.wait();
+        }
+    }
+
+    pub fn until(&mut self, what: &str, happened: impl Fn(&App) -> bool) {
+        let begun = Instant::now();
+        while !happened(self.harness.state()) {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "{what}: not yet; {:?}",
+                self.harness.state().desk()
+            );
+            self.wait();
+        }
+    }
+
+    /// Until the worker has nothing left to do and nothing moves.
+    pub fn idle(&mut self) {
+        self.until("everything is done", App::is_idle);
+        for _ in 0..4 {
+            self.harness.step();
+        }
+    }
+
+    fn wait(&mut self) {
+        self.harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// What `act` leads to, as a picture at two sizes and in both themes. Only one of the four is used beyond looking: they take
+/// their time.
+pub fn both_themes(name: &str, act: impl Fn(&mut Window)) {
+    let mut results = SnapshotResults::new();
+    let all = [
+        ("dark", egui::Theme::Dark, WIDE),
+        ("light", egui::Theme::Light, WIDE),
+        ("dark-small", egui::Theme::Dark, SMALL),
+        ("light-small", egui::Theme::Light, SMALL),
+    ];
+    for (variant, theme, size) in all {
+        let mut window = Window::new(size, theme);
+        act(&mut window);
+        window.harness.run();
+        results.add(window.harness.try_snapshot(format!("{name}-{variant}")));
+    }
+}
