@@ -84,6 +84,10 @@ fn light(visuals: &mut egui::Visuals) {
     visuals.selection.stroke = Stroke::new(1.0, Color32::BLACK);
     visuals.hyperlink_color = Color32::from_rgb(0x00, 0x5B, 0x8F);
     visuals.override_text_color = Some(Color32::from_gray(25));
+    // Buttons stand out from cards and panels alike.
+    visuals.widgets.inactive.weak_bg_fill = Color32::from_gray(212);
+    visuals.widgets.hovered.weak_bg_fill = Color32::from_gray(200);
+    visuals.widgets.inactive.bg_fill = Color32::from_gray(212);
     round(visuals);
 }
 

@@ -13,6 +13,14 @@ pub fn heading(ui: &mut egui::Ui, title: &str, what: &str) {
     }
 }
 
+/// The one button that a room is about.
+pub fn primary(ui: &mut egui::Ui, text: &str, size: egui::Vec2, enabled: bool) -> egui::Response {
+    let visuals = ui.visuals().selection;
+    let text = RichText::new(text).size(17.0).strong().color(visuals.stroke.color);
+    let button = egui::Button::new(text).fill(visuals.bg_fill);
+    ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner
+}
+
 /// What there is to see where there is nothing yet: what is missing, and one button that does something about it. True when
 /// it is clicked.
 pub fn empty(ui: &mut egui::Ui, what: &str, remedy: &str) -> bool {

@@ -2,10 +2,13 @@
 
 use crate::desk::Desk;
 use crate::texts::welcome as texts;
-use crate::theme;
 use crate::worker::Command;
+use crate::{theme, widgets};
 use eframe::egui::{self, RichText};
 use std::path::PathBuf;
+
+/// Of the two cards, points.
+const WIDTH: f32 = 560.0;
 
 /// What it keeps.
 #[derive(Debug, Default)]
@@ -21,10 +24,16 @@ impl Welcome {
             ui.label(RichText::new(texts::HEADING).size(28.0).strong());
             ui.label(RichText::new(texts::WHAT).size(16.0));
             ui.add_space(2.0 * theme::WIDE_GAP);
-            ui.set_max_width(520.0);
-            card(ui, |ui| try_it(ui, desk));
-            ui.add_space(theme::GAP);
-            card(ui, |ui| self.open(ui, desk));
+        });
+        let side = (ui.available_width() - WIDTH).max(0.0) / 2.0;
+        ui.horizontal_top(|ui| {
+            ui.add_space(side);
+            ui.vertical(|ui| {
+                ui.set_max_width(WIDTH.min(ui.available_width()));
+                card(ui, |ui| try_it(ui, desk));
+                ui.add_space(theme::GAP);
+                card(ui, |ui| self.open(ui, desk));
+            });
         });
     }
 
@@ -51,9 +60,7 @@ impl Welcome {
 }
 
 fn try_it(ui: &mut egui::Ui, desk: &mut Desk) {
-    let text = RichText::new(texts::TRY).size(16.0).strong();
-    let button = egui::Button::new(text).min_size(egui::vec2(300.0, theme::BIG));
-    if ui.add(button).clicked() {
+    if widgets::primary(ui, texts::TRY, egui::vec2(320.0, theme::BIG), true).clicked() {
         desk.ask(Command::MakeSimulatedRig(desk.settings.home.join(texts::SIMULATED)));
     }
     ui.label(texts::TRY_WHAT);

@@ -32,6 +32,7 @@ impl Window {
         };
         let harness = Harness::builder()
             .with_size(size)
+            .with_theme(theme)
             .with_max_steps(64)
             .build_eframe(|cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings));
         Self { harness, home }

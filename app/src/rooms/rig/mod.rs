@@ -16,7 +16,7 @@ use weavelight::instrument::{CalibratedLight, RigLightPlace};
 use weavelight_calibration::description::Light;
 
 /// What this room asks of the worker.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum Ask {
     /// Look for board and camera.
     Find,

@@ -4,7 +4,7 @@ use super::{Ask, Order};
 use crate::desk::Desk;
 use crate::settings::{MethodName, SolveSettings};
 use crate::worker::Command;
-use crate::{texts::scan as texts, theme};
+use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui::{self, RichText};
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{Preview, Summary};
@@ -115,14 +115,9 @@ impl Form {
 
     /// The big button. True when it is clicked.
     pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk) -> bool {
-        let text = RichText::new(texts::SCAN).size(18.0).strong();
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
-        let visuals = ui.visuals().selection;
-        let button = egui::Button::new(text.color(visuals.stroke.color))
-            .min_size(size)
-            .fill(visuals.bg_fill);
-        let clicked =
-            ui.add_enabled(self.can_begin(desk), button).on_hover_text(texts::SPACE).clicked();
+        let button = widgets::primary(ui, texts::SCAN, size, self.can_begin(desk));
+        let clicked = button.on_hover_text(texts::SPACE).clicked();
         let hint = if self.is_taken(desk) { texts::TAKEN } else { texts::SPACE };
         ui.label(RichText::new(hint).small().weak());
         clicked

@@ -158,7 +158,7 @@ impl Scan {
             let paused = self.stage == Stage::Paused;
             let size = egui::vec2(120.0, theme::BIG);
             let text = if paused { texts::GO_ON } else { texts::PAUSE };
-            if ui.add(egui::Button::new(text).min_size(size)).clicked() {
+            if ui.add_sized(size, egui::Button::new(text)).clicked() {
                 desk.brake(if paused {
                     crate::desk::Brake::GoOn
                 } else {
@@ -166,7 +166,7 @@ impl Scan {
                 });
                 self.stage = Stage::Scanning;
             }
-            if ui.add(egui::Button::new(texts::STOP).min_size(size)).clicked() {
+            if ui.add_sized(size, egui::Button::new(texts::STOP)).clicked() {
                 desk.brake(crate::desk::Brake::Cancel);
             }
         });

@@ -50,7 +50,7 @@ impl Strip {
             ui.horizontal_centered(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.5 * theme::GAP;
                 let room = ui.available_width() / (lights + 1).max(1) as f32 - 0.5 * theme::GAP;
-                let width = room.clamp(64.0, 116.0);
+                let width = room.clamp(50.0, 116.0);
                 cells.for_each(|light| self.cell(ui, light, width));
             });
         });
