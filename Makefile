@@ -1,6 +1,7 @@
 # make demo    simulate a rig, scan a swatch, solve it, and open the report's folder: the whole job, no hardware
 # make test    every test
 # make build   the release executables with every feature, in target/release
+# make install   them, with desktop entry and icon, below PREFIX (~/.local)
 # make firmware the light board's firmware, and the simulated board that tests run it in
 # make soak    light board and host for fifteen minutes over a bad wire
 # make kills   the program killed two hundred times while it scans, at the simulated board
@@ -20,7 +21,7 @@ WINDOW_PACKAGES := libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
-.PHONY: demo test build bench soak kills scan-timing tether-timing firmware packages-demo packages-all packages-firmware
+.PHONY: demo test build install bench soak kills scan-timing tether-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -48,6 +49,12 @@ test: packages-all firmware
 
 build: packages-all
 	cargo build --release --locked --workspace --all-features
+
+PREFIX ?= $(HOME)/.local
+install: build
+	install -D -t $(PREFIX)/bin target/release/weavelight target/release/weavelight-app target/release/weavelight-tether
+	install -D -m 644 -t $(PREFIX)/share/applications app/desktop/weavelight.desktop
+	install -D -m 644 -t $(PREFIX)/share/icons/hicolor/64x64/apps app/desktop/weavelight.png
 
 bench: packages-all
 	cargo bench --locked --all-features

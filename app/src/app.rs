@@ -78,6 +78,7 @@ impl App {
             }
             Update::Ended => desk.activity = None,
             Update::Problem(problem) => desk.tell(problem),
+            Update::GoTo(room) => desk.go_to(room),
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
@@ -148,7 +149,7 @@ impl App {
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         if let Some(path) = dropped.into_iter().next().map(|file| file.path().to_owned()) {
-            self.desk.ask(Command::Open(path));
+            self.desk.ask(Command::Dropped(path));
         }
     }
 

@@ -37,6 +37,11 @@ impl Place {
         self.folder.join("calibration")
     }
 
+    /// Whether maps can be made: lights are measured.
+    pub fn is_calibrated(&self) -> bool {
+        self.calibration().join(weavelight::instrument::LIGHTS_FILE).exists()
+    }
+
     /// Capture sessions of calibration targets.
     pub fn targets(&self) -> PathBuf {
         self.folder.join("targets")

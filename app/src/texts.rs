@@ -273,6 +273,15 @@ pub mod scan {
     /// The empty room.
     pub const HOW_TO: &str =
         "A test shot shows exposure and focus first. Maps appear here while the lights fire.";
+    /// While the first lights fire.
+    pub const MAPS_COME: &str = "Maps appear after the third light";
+    /// While lights fire, without a calibration.
+    pub const NO_MAPS: &str = "Frames are taken; maps need a calibration first";
+    /// The empty room without a calibration.
+    pub const NOT_CALIBRATED: &str =
+        "This rig is not calibrated yet: scans can be taken, but maps need a calibration";
+    /// The way out.
+    pub const CALIBRATE: &str = "Calibrate it";
 
     /// Work.
     pub fn scanning(name: &str) -> String {

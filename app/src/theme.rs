@@ -119,7 +119,7 @@ fn icon_pixel(x: u32, y: u32, side: u32) -> [u8; 4] {
     let (a, b) = ((u * yarns).fract() - 0.5, (v * yarns).fract() - 0.5);
     let warp_over = (i + j).is_multiple_of(2);
     let across = if warp_over { a } else { b };
-    let shade = (1.0 - 2.0 * (across + 0.15).powi(2) * 2.0).clamp(0.15, 1.0);
+    let shade = (1.0 - 4.0 * (across + 0.15).powi(2)).clamp(0.15, 1.0);
     let glow = (1.2 - ((u - 0.15).powi(2) + (v - 0.15).powi(2)).sqrt()).clamp(0.3, 1.0);
     let tint = if warp_over { [240.0, 228.0, 200.0] } else { [86.0, 180.0, 233.0] };
     let [r, g, b] = tint.map(|c: f32| (c * shade * glow) as u8);

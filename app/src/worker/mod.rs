@@ -11,7 +11,7 @@ pub use job::{Ended, Outbox};
 
 use crate::desk::Problem;
 use crate::place::Place;
-use crate::rooms::{calibrate, look, rig, scan, scans};
+use crate::rooms::{Room, calibrate, look, rig, scan, scans};
 use eframe::egui;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,6 +25,8 @@ use weavelight::device::scan::Instruments;
 pub enum Command {
     /// Open the rig in this folder.
     Open(PathBuf),
+    /// Do what is meant by a folder that was dropped into the window: open the rig, solve the scan, look at the solution.
+    Dropped(PathBuf),
     /// Make a simulated rig in this folder, and open it.
     MakeSimulatedRig(PathBuf),
     /// Of the Rig room.
@@ -57,6 +59,8 @@ pub enum Update {
     Ended,
     /// Something went wrong.
     Problem(Problem),
+    /// What was asked for is in this room.
+    GoTo(Room),
     /// A rig is open.
     Opened(Box<Place>),
     /// For the Rig room.
@@ -132,6 +136,7 @@ impl Worker {
 fn act(command: Command, tools: &mut Tools, out: &Outbox) {
     match command {
         Command::Open(folder) => open::open(&folder, tools, out),
+        Command::Dropped(path) => open::dropped(path, tools, out),
         Command::MakeSimulatedRig(folder) => open::make_simulated(&folder, tools, out),
         Command::Rig(ask) => rig::act(ask, tools, out),
         Command::Calibrate(ask) => calibrate::act(ask, tools, out),

@@ -2,8 +2,9 @@
 
 use super::{Outbox, Tools, Update};
 use crate::place::Place;
+use crate::rooms::{Room, look, scan};
 use crate::texts::rig as texts;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use weavelight::simulate;
 
 /// A quarter of the reference camera's size: the whole loop in minutes on a small computer.
@@ -31,6 +32,20 @@ pub(super) fn make_simulated(folder: &Path, tools: &mut Tools, out: &Outbox) {
     match made {
         Ok(()) => open(folder, tools, out),
         Err(error) => out.fail(texts::MAKING_SIMULATED, &error),
+    }
+}
+
+/// What a folder that was dropped is for is seen by what lies in it.
+pub(super) fn dropped(path: PathBuf, tools: &mut Tools, out: &Outbox) {
+    let has = |file: &str| path.join(file).exists();
+    if has(weavelight::solution::REPORT_JSON) {
+        out.tell(Update::GoTo(Room::Look));
+        look::act(look::Ask::Open(path), tools, out);
+    } else if has(weavelight::session::MANIFEST) {
+        out.tell(Update::GoTo(Room::Scan));
+        out.tell(Update::Scan(scan::Told::Dropped(path)));
+    } else {
+        open(&path, tools, out);
     }
 }
 

@@ -12,10 +12,11 @@ mod work;
 pub use picture::Thumb;
 
 use crate::desk::Desk;
+use crate::place::Place;
 use crate::rooms::{Room, look};
 use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
-use crate::{texts::scan as texts, theme};
+use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui;
 use form::Form;
 use std::path::PathBuf;
@@ -92,6 +93,8 @@ pub enum Told {
         /// What it says of itself.
         report: Box<Report>,
     },
+    /// The folder of a scan to solve.
+    Dropped(PathBuf),
     /// Name and frames of a scan that was stopped, if there is one.
     Unfinished(Option<(String, usize)>),
 }
@@ -136,8 +139,25 @@ impl Scan {
         });
         egui::CentralPanel::default().show(ui, |ui| {
             self.result(ui, desk);
-            self.view.ui(ui);
+            let running = matches!(self.stage, Stage::Scanning | Stage::Paused);
+            let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
+            match (running, calibrated) {
+                (false, false) => self.ask_to_calibrate(ui, desk),
+                (true, true) => self.view.ui(ui, texts::MAPS_COME),
+                (true, false) => self.view.ui(ui, texts::NO_MAPS),
+                (false, true) => self.view.ui(ui, texts::NOTHING_YET),
+            }
         });
+    }
+
+    /// Without a calibration frames can be taken, but no maps come of them.
+    fn ask_to_calibrate(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if self.view.has_test_shot() {
+            return self.view.ui(ui, "");
+        }
+        if widgets::empty(ui, texts::NOT_CALIBRATED, texts::CALIBRATE) {
+            desk.go_to(Room::Calibrate);
+        }
     }
 
     fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
@@ -267,6 +287,10 @@ impl Scan {
                 self.stage = Stage::Scanned(summary);
             }
             Told::Solved { solution, report } => self.stage = Stage::Solved { solution, report },
+            Told::Dropped(scan) => {
+                let settings = desk.settings.solve;
+                desk.ask(Command::Scan(Ask::Solve { scan, settings }));
+            }
             Told::Unfinished(found) => {
                 if matches!(self.stage, Stage::Scanning | Stage::Paused) {
                     self.stage = Stage::Ready;
@@ -275,7 +299,6 @@ impl Scan {
                 self.unfinished = found;
             }
         }
-        let _ = desk;
     }
 
     /// Another rig: nothing of the last one stays.

@@ -53,7 +53,12 @@ impl View {
         self.fresh = Some([normals(&preview.normal), picture(&preview.albedo, [1.0; 3])]);
     }
 
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui) {
+    pub(super) fn has_test_shot(&self) -> bool {
+        self.shot.is_some()
+    }
+
+    /// Draws it; where there is nothing, `empty` says why.
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, empty: &str) {
         if let Some([normal, albedo]) = self.fresh.take() {
             let load =
                 |name: &str, image| ui.ctx().load_texture(name, image, TextureOptions::LINEAR);
@@ -62,7 +67,7 @@ impl View {
         match (&self.shot, &self.maps) {
             (Some(_), _) => self.test_shot(ui),
             (None, Some(_)) => self.maps(ui),
-            (None, None) => nothing_yet(ui),
+            (None, None) => nothing_yet(ui, empty),
         }
     }
 
@@ -111,10 +116,10 @@ fn fit(ui: &mut egui::Ui, texture: &TextureHandle, name: &str) {
     });
 }
 
-fn nothing_yet(ui: &mut egui::Ui) {
+fn nothing_yet(ui: &mut egui::Ui, why: &str) {
     ui.vertical_centered(|ui| {
         ui.add_space(ui.available_height() * 0.35);
-        ui.label(RichText::new(texts::NOTHING_YET).size(16.0).weak());
+        ui.label(RichText::new(why).size(16.0).weak());
         ui.label(RichText::new(texts::HOW_TO).weak());
     });
 }

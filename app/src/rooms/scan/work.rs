@@ -69,7 +69,7 @@ fn scan_and_solve(order: &Order, tools: &mut Tools, out: &Outbox) {
         Ok(Outcome::Complete(summary)) => {
             out.warn(&order.name, &summary.warnings);
             out.tell(Update::Scan(Told::Complete(summary)));
-            if place.calibration().exists() {
+            if place.is_calibrated() {
                 solve(&folder, order.solve, tools, out);
             }
         }
