@@ -136,13 +136,16 @@ impl App {
         }
     }
 
-    /// Control and a digit opens a room, Escape ends what is going on; a folder that is dropped is opened.
+    /// Control and a digit opens a room, Escape ends what is going on, Control and Q leaves; a folder that is dropped is opened.
     fn keys(&mut self, ctx: &egui::Context) {
         const DIGITS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         for (room, digit) in Room::ALL.into_iter().zip(DIGITS) {
             if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, digit)) {
                 self.desk.go_to(room);
             }
+        }
+        if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q)) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         if self.desk.is_busy() && ctx.input(|input| input.key_pressed(Key::Escape)) {
             self.worker.brake.cancel();
@@ -227,6 +230,13 @@ fn view_menu(ui: &mut egui::Ui, settings: &mut Settings) {
     ui.label(texts::SCALE);
     for scale in [0.8, 1.0, 1.25, 1.5, 2.0] {
         ui.radio_value(&mut settings.scale, scale, format!("{:.0} %", 100.0 * scale));
+    }
+    ui.separator();
+    for (keys, what) in texts::KEYS {
+        ui.horizontal(|ui| {
+            ui.monospace(keys);
+            ui.label(what);
+        });
     }
     if *settings != before {
         theme::apply(ui.ctx(), settings);

@@ -23,6 +23,14 @@ pub const THEMES: [&str; 3] = ["As the system", "Light", "Dark"];
 /// Size of everything.
 pub const SCALE: &str = "Size";
 
+/// Keys and what they do.
+pub const KEYS: [(&str, &str); 4] = [
+    ("Space     ", "scan, or take the picture"),
+    ("Ctrl+1…5  ", "open a room"),
+    ("Esc       ", "end what is going on"),
+    ("Ctrl+Q    ", "leave"),
+];
+
 /// Time left, in words.
 pub fn time_left(seconds: f64) -> String {
     match seconds {

@@ -126,3 +126,26 @@ fn scans_are_found_opened_exported_and_deleted() {
         window.idle();
     });
 }
+
+/// The window and the command line make the same library calls with the same settings.
+#[test]
+fn the_window_solves_as_the_command_line_does() {
+    let mut window = Window::new(desk::SMALL, egui::Theme::Dark);
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    window.click("Scan the swatch");
+    window.until_label("Look closer");
+    let rig = window.rig();
+    let options = weavelight::solve::Options::new(
+        rig.join("scans/linen 1"),
+        rig.join("calibration"),
+        rig.join("by-command"),
+    );
+    weavelight::solve::run(&options, &|_| ()).unwrap();
+    for file in
+        ["normal.exr", "albedo.exr", "confidence.exr", "normal.png", "albedo.png", "mask.png"]
+    {
+        let read = |folder: &str| std::fs::read(rig.join(folder).join(file)).unwrap();
+        assert!(read("by-command") == read("solutions/linen 1"), "{file} differs");
+    }
+}

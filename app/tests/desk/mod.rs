@@ -8,21 +8,21 @@ use weavelight::simulate;
 use weavelight_app::{App, rooms::Room, settings::Settings, worker::Command};
 
 /// The size that most have.
-pub const WIDE: [f32; 2] = [1280.0, 800.0];
+pub(crate) const WIDE: [f32; 2] = [1280.0, 800.0];
 /// A small laptop's.
-pub const SMALL: [f32; 2] = [960.0, 640.0];
+pub(crate) const SMALL: [f32; 2] = [960.0, 640.0];
 /// Work on small frames takes seconds; on a machine with much else to do, longer.
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Small enough for a test, large enough for a calibrated camera.
 const FRAME: [usize; 2] = [96, 64];
 
-pub struct Window {
-    pub harness: Harness<'static, App>,
+pub(crate) struct Window {
+    pub(crate) harness: Harness<'static, App>,
     home: tempfile::TempDir,
 }
 
 impl Window {
-    pub fn new(size: [f32; 2], theme: egui::Theme) -> Self {
+    pub(crate) fn new(size: [f32; 2], theme: egui::Theme) -> Self {
         let home = tempfile::tempdir().unwrap();
         let mut settings = Settings::load_from(&home.path().join("settings.toml"));
         settings.home = home.path().to_owned();
@@ -38,17 +38,17 @@ impl Window {
         Self { harness, home }
     }
 
-    pub fn home(&self) -> PathBuf {
+    pub(crate) fn home(&self) -> PathBuf {
         self.home.path().to_owned()
     }
 
     /// The small rig's folder.
-    pub fn rig(&self) -> PathBuf {
+    pub(crate) fn rig(&self) -> PathBuf {
         self.home().join("rig")
     }
 
     /// Makes the small rig, with its true calibration, where there is none yet, and opens it.
-    pub fn open_small_rig(&mut self) {
+    pub(crate) fn open_small_rig(&mut self) {
         let rig = self.rig();
         if !rig.exists() {
             let options = simulate::Options {
@@ -65,7 +65,7 @@ impl Window {
     }
 
     /// A scan as the simulator writes it.
-    pub fn scan_in_the_library(&mut self, name: &str) {
+    pub(crate) fn scan_in_the_library(&mut self, name: &str) {
         let to = self.rig().join("scans").join(name);
         std::fs::create_dir_all(&to).unwrap();
         for file in std::fs::read_dir(self.rig().join("swatch")).unwrap().flatten() {
@@ -80,19 +80,19 @@ impl Window {
         std::fs::write(&manifest, renamed.collect::<String>()).unwrap();
     }
 
-    pub fn enter(&mut self, room: Room) {
+    pub(crate) fn enter(&mut self, room: Room) {
         self.harness.state_mut().enter(room);
         self.harness.run();
     }
 
-    pub fn click(&mut self, label: &str) {
+    pub(crate) fn click(&mut self, label: &str) {
         self.until_label(label);
         self.harness.get_by_label(label).click();
         self.harness.step();
     }
 
     /// Waits for something with this name.
-    pub fn until_label(&mut self, label: &str) {
+    pub(crate) fn until_label(&mut self, label: &str) {
         let begun = Instant::now();
         while self.harness.query_by_label(label).is_none() {
             assert!(begun.elapsed() < PATIENCE, "no {label:?}; {:?}", self.harness.state().desk());
@@ -100,7 +100,7 @@ impl Window {
         }
     }
 
-    pub fn until(&mut self, what: &str, happened: impl Fn(&App) -> bool) {
+    pub(crate) fn until(&mut self, what: &str, happened: impl Fn(&App) -> bool) {
         let begun = Instant::now();
         while !happened(self.harness.state()) {
             assert!(
@@ -113,7 +113,7 @@ impl Window {
     }
 
     /// Until the worker has nothing left to do and nothing moves.
-    pub fn idle(&mut self) {
+    pub(crate) fn idle(&mut self) {
         self.until("everything is done", App::is_idle);
         for _ in 0..4 {
             self.harness.step();
@@ -128,7 +128,7 @@ impl Window {
 
 /// What `act` leads to, as a picture at two sizes and in both themes. Only one of the four is used beyond looking: they take
 /// their time.
-pub fn both_themes(name: &str, act: impl Fn(&mut Window)) {
+pub(crate) fn both_themes(name: &str, act: impl Fn(&mut Window)) {
     let mut results = SnapshotResults::new();
     let all = [
         ("dark", egui::Theme::Dark, WIDE),
