@@ -24,8 +24,12 @@ pub const THEMES: [&str; 3] = ["As the system", "Light", "Dark"];
 pub const SCALE: &str = "Size";
 
 /// Keys and what they do.
-pub const KEYS: [(&str, &str); 4] = [
+pub const KEYS: [(&str, &str); 8] = [
     ("Space     ", "scan, or take the picture"),
+    ("Arrows    ", "choose a scan"),
+    ("Enter     ", "look at it"),
+    ("Ctrl+E    ", "export its maps"),
+    ("Delete    ", "move it to the bin"),
     ("Ctrl+1…5  ", "open a room"),
     ("Esc       ", "end what is going on"),
     ("Ctrl+Q    ", "leave"),

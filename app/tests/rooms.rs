@@ -127,6 +127,38 @@ fn scans_are_found_opened_exported_and_deleted() {
     });
 }
 
+#[test]
+fn scans_are_searched_solved_exported_and_deleted() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.open_small_rig();
+    window.scan_in_the_library("silk 12");
+    window.scan_in_the_library("wool 7");
+    window.enter(Room::Scans);
+    window.until_label("wool 7, not solved yet");
+    let search = window.harness.get_by_role(egui::accesskit::Role::TextInput);
+    search.focus();
+    search.type_text("SILK");
+    window.harness.run();
+    assert!(window.harness.query_by_label("wool 7, not solved yet").is_none());
+    window.click("silk 12, not solved yet");
+    window.click("Solve");
+    window.until_label("silk 12, solved");
+    window.click("Export");
+    window.idle();
+    let exported = window.home().join("exports/silk 12 maps");
+    assert!(exported.join("normal.exr").exists());
+    window.click("Delete");
+    window.idle();
+    assert!(!window.rig().join("scans/silk 12").exists());
+    assert!(!window.rig().join("solutions/silk 12").exists());
+    assert!(window.rig().join("scans/wool 7").exists());
+    // From the bin they could be restored; here they leave it again.
+    let ours = |item: &trash::TrashItem| item.original_parent.starts_with(window.home());
+    let binned: Vec<_> = trash::os_limited::list().unwrap().into_iter().filter(ours).collect();
+    assert_eq!(binned.len(), 2, "the scan and its solution");
+    trash::os_limited::purge_all(binned).unwrap();
+}
+
 /// The window and the command line make the same library calls with the same settings.
 #[test]
 fn the_window_solves_as_the_command_line_does() {

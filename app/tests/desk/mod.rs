@@ -12,7 +12,7 @@ pub(crate) const WIDE: [f32; 2] = [1280.0, 800.0];
 /// A small laptop's.
 pub(crate) const SMALL: [f32; 2] = [960.0, 640.0];
 /// Work on small frames takes seconds; on a machine with much else to do, longer.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Small enough for a test, large enough for a calibrated camera.
 const FRAME: [usize; 2] = [96, 64];
 
@@ -87,6 +87,8 @@ impl Window {
 
     pub(crate) fn click(&mut self, label: &str) {
         self.until_label(label);
+        // What has just appeared may still move.
+        self.harness.step();
         self.harness.get_by_label(label).click();
         self.harness.step();
     }

@@ -9,7 +9,9 @@ use crate::desk::Desk;
 use crate::rooms::{Room, look, scan};
 use crate::worker::{Command, Outbox, Tools};
 use crate::{texts::scans as texts, theme, widgets};
-use eframe::egui::{self, ColorImage, RichText, Sense, TextureHandle, TextureOptions, vec2};
+use eframe::egui::{
+    self, ColorImage, Key, Modifiers, RichText, Sense, TextureHandle, TextureOptions, vec2,
+};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -105,13 +107,8 @@ impl Scans {
             }
             return;
         }
-        let wanted = self.search.to_lowercase();
-        let found: Vec<Entry> = self
-            .entries
-            .iter()
-            .filter(|e| e.name.to_lowercase().contains(&wanted))
-            .cloned()
-            .collect();
+        let found = self.found();
+        self.keys(ui, &found, desk);
         if found.is_empty() {
             ui.label(texts::nothing_found(&self.search));
         }
@@ -121,6 +118,43 @@ impl Scans {
                 found.iter().for_each(|entry| self.card(ui, entry, desk));
             });
         });
+    }
+
+    fn found(&self) -> Vec<Entry> {
+        let wanted = self.search.to_lowercase();
+        let fits = |entry: &&Entry| entry.name.to_lowercase().contains(&wanted);
+        self.entries.iter().filter(fits).cloned().collect()
+    }
+
+    /// Arrows choose, Enter opens, Control and E exports, Delete deletes.
+    fn keys(&mut self, ui: &egui::Ui, found: &[Entry], desk: &mut Desk) {
+        if ui.ctx().egui_wants_keyboard_input() || found.is_empty() {
+            return;
+        }
+        let pressed = |key| ui.input(|input| input.key_pressed(key));
+        let at = found.iter().position(|entry| self.chosen.as_ref() == Some(&entry.folder));
+        if pressed(Key::ArrowRight) || pressed(Key::ArrowDown) {
+            self.choose(&found[at.map_or(0, |k| (k + 1).min(found.len() - 1))]);
+        } else if pressed(Key::ArrowLeft) || pressed(Key::ArrowUp) {
+            self.choose(&found[at.map_or(0, |k| k.saturating_sub(1))]);
+        }
+        let Some(entry) = at.map(|k| found[k].clone()) else { return };
+        let export = ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::E));
+        if pressed(Key::Enter) {
+            open(&entry, desk);
+        } else if let Some(solution) = entry.solution.clone().filter(|_| export) {
+            let to = export_folder(&entry, desk);
+            desk.ask(Command::Scans(Ask::Export { solution, to }));
+        } else if pressed(Key::Delete) && !desk.is_busy() {
+            self.chosen = None;
+            desk.ask(Command::Scans(Ask::Delete(entry)));
+        }
+    }
+
+    fn choose(&mut self, entry: &Entry) {
+        self.chosen = Some(entry.folder.clone());
+        self.export_to.clear();
+        self.said = None;
     }
 
     fn card(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
@@ -153,9 +187,7 @@ impl Scans {
         if response.double_clicked() {
             open(entry, desk);
         } else if response.clicked() {
-            self.chosen = Some(entry.folder.clone());
-            self.export_to.clear();
-            self.said = None;
+            self.choose(entry);
         }
     }
 
@@ -214,8 +246,7 @@ impl Scans {
 
     fn export(&mut self, ui: &mut egui::Ui, solution: PathBuf, entry: &Entry, desk: &mut Desk) {
         if self.export_to.is_empty() {
-            let folder = format!("{} maps", entry.name);
-            self.export_to = desk.settings.home.join("exports").join(folder).display().to_string();
+            self.export_to = export_folder(entry, desk).display().to_string();
         }
         let label = ui.label(texts::EXPORT_TO);
         let field = egui::TextEdit::singleline(&mut self.export_to).desired_width(f32::INFINITY);
@@ -256,6 +287,11 @@ impl Scans {
     pub fn is_stale(&mut self) {
         self.fresh = false;
     }
+}
+
+/// Where the maps go if nobody says otherwise.
+fn export_folder(entry: &Entry, desk: &Desk) -> PathBuf {
+    desk.settings.home.join("exports").join(format!("{} maps", entry.name))
 }
 
 fn open(entry: &Entry, desk: &mut Desk) {
