@@ -1,0 +1,184 @@
+//! The program in a real window, on a display of its own: started, a swatch scanned with the simulated board and camera, lit
+//! anew, exported, quit. With `WEAVELIGHT_PICTURES=DIR` its pictures are kept there: the README's.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use weavelight::simulate;
+
+/// Frames of the rig that is scanned: small, so that the test is quick; larger for pictures.
+const FRAME: [usize; 2] = [308, 204];
+const PICTURE_FRAME: [usize; 2] = [1232, 816];
+/// How long anything may take on a machine with much else to do.
+const PATIENCE: Duration = Duration::from_secs(180);
+
+/// A display without a screen, and the program in it.
+struct Desktop {
+    server: Child,
+    display: String,
+    app: Option<Child>,
+    home: tempfile::TempDir,
+}
+
+impl Desktop {
+    /// `None` where the tools are missing.
+    fn start() -> Option<Self> {
+        for tool in ["xdotool", "import"] {
+            Command::new(tool)
+                .arg("--version")
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .status()
+                .ok()?;
+        }
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x800x24"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .ok()?;
+        let mut number = String::new();
+        BufReader::new(server.stdout.take()?).read_line(&mut number).ok()?;
+        let display = format!(":{}", number.trim());
+        Some(Self { server, display, app: None, home: tempfile::tempdir().unwrap() })
+    }
+
+    fn home(&self) -> &Path {
+        self.home.path()
+    }
+
+    fn open(&mut self) {
+        let app = Command::new(env!("CARGO_BIN_EXE_weavelight-app"))
+            .env("DISPLAY", &self.display)
+            .env_remove("WAYLAND_DISPLAY")
+            .env("HOME", self.home())
+            .env("XDG_CONFIG_HOME", self.home().join("config"))
+            .env("XDG_RUNTIME_DIR", self.home())
+            .stdin(Stdio::null())
+            .spawn()
+            .unwrap();
+        self.app = Some(app);
+        self.xdotool(&[
+            "search",
+            "--sync",
+            "--onlyvisible",
+            "--name",
+            "^Weavelight$",
+            "windowfocus",
+        ]);
+    }
+
+    fn xdotool(&self, arguments: &[&str]) {
+        let done = Command::new("xdotool")
+            .env("DISPLAY", &self.display)
+            .args(arguments)
+            .stdout(Stdio::null())
+            .status();
+        assert!(done.unwrap().success(), "xdotool {arguments:?}");
+    }
+
+    fn key(&self, keys: &str) {
+        self.xdotool(&["key", "--delay", "50", keys]);
+        // One frame to take it in.
+        std::thread::sleep(Duration::from_millis(300));
+    }
+
+    /// A picture of the screen; more than one colour is in it.
+    fn picture(&self, name: &str) -> PathBuf {
+        std::thread::sleep(Duration::from_millis(500));
+        let folder =
+            std::env::var_os("WEAVELIGHT_PICTURES").map_or(self.home().to_owned(), PathBuf::from);
+        let file = folder.join(format!("{name}.png"));
+        let done = Command::new("import")
+            .env("DISPLAY", &self.display)
+            .args(["-window", "root"])
+            .arg(&file)
+            .status();
+        assert!(done.unwrap().success());
+        let pixels = image::open(&file).unwrap().to_rgb8();
+        let first = *pixels.get_pixel(0, 0);
+        assert!(pixels.pixels().any(|pixel| *pixel != first), "{name}: nothing is drawn");
+        file
+    }
+
+    /// The program leaves by itself, without a complaint.
+    fn quit(&mut self) {
+        self.key("ctrl+q");
+        let mut app = self.app.take().unwrap();
+        let status = until("the program has left", || app.try_wait().unwrap());
+        assert!(status.success(), "{status}");
+    }
+}
+
+impl Drop for Desktop {
+    fn drop(&mut self) {
+        let _ = self.app.as_mut().map(Child::kill);
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+fn until<T>(what: &str, mut happened: impl FnMut() -> Option<T>) -> T {
+    let begun = Instant::now();
+    loop {
+        if let Some(value) = happened() {
+            return value;
+        }
+        assert!(begun.elapsed() < PATIENCE, "{what}: not yet");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+fn exists(file: &Path) {
+    until(&file.display().to_string(), || file.exists().then_some(()));
+}
+
+#[test]
+fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
+    let Some(mut desktop) = Desktop::start() else {
+        println!("not run: Xvfb, xdotool or ImageMagick is missing");
+        return;
+    };
+    let rig = desktop.home().join("rig");
+    let pictures = std::env::var_os("WEAVELIGHT_PICTURES").is_some();
+    let options = simulate::Options {
+        out: rig.clone(),
+        size_px: Some(if pictures { PICTURE_FRAME } else { FRAME }),
+        only: vec![simulate::Part::Swatch],
+        ..Default::default()
+    };
+    simulate::run(&options, &|_, _| ()).unwrap();
+    let config = desktop.home().join("config/weavelight");
+    std::fs::create_dir_all(&config).unwrap();
+    let settings = format!(
+        "schema = 1\nrig = {:?}\nhome = {:?}\ntheme = \"dark\"\n",
+        rig.display().to_string(),
+        desktop.home().display().to_string()
+    );
+    std::fs::write(config.join("settings.toml"), settings).unwrap();
+
+    desktop.open();
+    desktop.key("ctrl+3");
+    desktop.key("space");
+    exists(&rig.join("scans/linen 1/light-05.dng"));
+    desktop.picture("app-scan");
+    exists(&rig.join("solutions/linen 1/report.json"));
+    desktop.picture("app-scanned");
+    desktop.key("ctrl+1");
+    desktop.picture("app-rig");
+    desktop.key("ctrl+2");
+    desktop.picture("app-calibrate");
+    desktop.key("ctrl+5");
+    std::thread::sleep(Duration::from_secs(1));
+    desktop.key("Right");
+    desktop.picture("app-scans");
+    desktop.key("ctrl+e");
+    exists(&desktop.home().join("exports/linen 1 maps/normal.exr"));
+    desktop.key("Return");
+    std::thread::sleep(Duration::from_secs(2));
+    desktop.picture("app-look");
+    desktop.quit();
+    let kept = std::fs::read_to_string(config.join("settings.toml")).unwrap();
+    assert!(kept.contains("room = \"look\""), "the room is remembered:\n{kept}");
+}
