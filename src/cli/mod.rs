@@ -14,6 +14,7 @@ mod progress;
 mod scan;
 mod simulate;
 mod solve;
+mod target;
 #[cfg(test)]
 mod tests;
 
@@ -36,7 +37,7 @@ struct Cli {
 enum Command {
     Demo(demo::Args),
     Simulate(Box<simulate::Args>),
-    Scan(scan::Args),
+    Scan(Box<scan::Args>),
     Solve(solve::Args),
     Import(import::Args),
     Calibrate(calibrate::Args),

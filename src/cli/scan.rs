@@ -2,22 +2,30 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
+use super::target;
 use crate::device::camera::Settings;
 use crate::device::scan::{
-    About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Summary, open,
-    preview, scan,
+    About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Subject, Summary,
+    open, preview, scan,
 };
 use crate::instrument::Rig;
+use crate::session::{FrameEntry, Session};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Photograph a swatch under one light after the other
+/// Photograph a swatch, or a calibration target, under one light after the other
 ///
 /// Takes a frame with every LED off, one under each light, and the first again. Every frame is safe on disk before the next
-/// light; a scan that was stopped or killed goes on with --resume.
+/// light; a scan that was stopped or killed goes on with --resume. Targets for `weavelight calibrate` are photographed with
+/// --kind: a white sheet in the same way, a grey chart also under one light at several exposures, a chessboard one picture a
+/// call.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example:\n  weavelight scan --rig rig.toml --out linen-4021 --thickness-mm 0.8\n  weavelight scan --rig rig.toml --preview"
+    after_help = "Example:\n  weavelight scan --rig rig.toml --out linen-4021 --thickness-mm 0.8\n  weavelight scan --rig rig.toml --preview\n  \
+    weavelight scan --rig rig.toml --kind board --board 9x6x25 --out board\n  \
+    weavelight scan --rig rig.toml --kind grey --target chart.toml --out grey\n  \
+    weavelight scan --rig rig.toml --kind white --thickness-mm 100 --out white-raised\n  \
+    weavelight scan --rig rig.toml --kind white --plane-point 0,0,60 --plane-normal 0.24,0.24,0.94 --out white-tilt-1"
 )]
 pub(super) struct Args {
     /// The rig
@@ -29,7 +37,7 @@ pub(super) struct Args {
     /// Name of the swatch [default: the folder's]
     #[arg(long, value_name = "N")]
     name: Option<String>,
-    /// How thick the swatch is: its surface lies this far over the table
+    /// How thick the swatch is, or how far a level sheet is raised: its surface lies this far over the table
     #[arg(long, value_name = "T", value_parser = thickness)]
     thickness_mm: Option<f64>,
     /// Exposure time, the same for every light [default: found with test shots under light 0]
@@ -50,9 +58,11 @@ pub(super) struct Args {
     /// Take one test shot, tell exposure and focus, and write nothing
     #[arg(long, conflicts_with_all = ["resume", "dry_run", "bracket"])]
     preview: bool,
-    /// The light of the test shot
-    #[arg(long, value_name = "K", default_value_t = 0, requires = "preview")]
-    light: usize,
+    /// The light of the test shot, or of a chessboard's picture [default: 0]
+    #[arg(long, value_name = "K")]
+    light: Option<usize>,
+    #[command(flatten)]
+    target: target::TargetArgs,
 }
 
 fn thickness(text: &str) -> Result<f64, String> {
@@ -67,31 +77,51 @@ const PREVIEW_S: f64 = 0.1;
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let rig = Rig::load(&args.rig).map_err(Failure::work)?;
-    let plan = Plan::new(&rig, &args.bracket).map_err(failure)?;
+    if args.preview {
+        return look(args, &rig, &Plan::new(&rig, &[]).map_err(failure)?);
+    }
+    if args.light.is_some() && !args.target.adds() {
+        return Err(Failure::call("--light goes with --preview or --kind board; leave it out"));
+    }
+    let there = args.out.as_deref().map_or(Vec::new(), frames_in);
+    let subject = args.target.subject(args.light.unwrap_or(0), there.is_empty())?;
+    let plan = Plan::of(&rig, &subject, &args.bracket, &there).map_err(failure)?;
     match &args.out {
         _ if args.dry_run => Ok(describe_plan(&plan, args)),
-        _ if args.preview => look(args, &rig, &plan),
-        Some(out) => photograph(args, &rig, out.clone()),
+        Some(out) => photograph(args, &rig, subject, out.clone()),
         None => Err(Failure::call("--out is missing; name a folder, as in --out linen-4021")),
     }
+}
+
+/// What a capture session holds already; nothing where there is none.
+fn frames_in(folder: &Path) -> Vec<FrameEntry> {
+    Session::load(folder).map_or(Vec::new(), |session| session.frames)
 }
 
 /// Some errors are about the call.
 fn failure(error: ScanError) -> Failure {
     match error {
-        ScanError::Bracket { .. } | ScanError::BracketByHand | ScanError::Option { .. } => {
-            Failure::call(error)
-        }
+        ScanError::Bracket { .. }
+        | ScanError::BracketByHand
+        | ScanError::BracketOfTarget
+        | ScanError::NoSuchLight { .. }
+        | ScanError::Option { .. } => Failure::call(error),
         _ => Failure::work(error),
     }
 }
 
-fn photograph(args: &Args, rig: &Rig, folder: PathBuf) -> Result<Output, Failure> {
+fn photograph(
+    args: &Args,
+    rig: &Rig,
+    subject: Subject,
+    folder: PathBuf,
+) -> Result<Output, Failure> {
     let Instruments { board, mut camera } = open(rig, &args.rig).map_err(failure)?;
     let options = Options {
         folder,
+        subject,
         about: About { name: args.name.clone(), thickness_mm: args.thickness_mm },
-        begin: if args.resume { Begin::Resume } else { Begin::Anew },
+        begin: if args.resume || args.target.adds() { Begin::Resume } else { Begin::Anew },
         exposure_s: args.exposure_s,
         iso: args.iso,
         bracket: args.bracket.clone(),
@@ -193,7 +223,7 @@ fn describe_plan(plan: &Plan, args: &Args) -> Output {
 }
 
 fn look(args: &Args, rig: &Rig, plan: &Plan) -> Result<Output, Failure> {
-    let light = args.light;
+    let light = args.light.unwrap_or(0);
     let step = plan.steps.iter().find(|step| step.light == Some(light));
     let output = step.and_then(|step| step.output).ok_or_else(|| {
         let last = rig.lights.len() - 1;

@@ -102,6 +102,33 @@ struct FrameTable {
     drift_check: bool,
 }
 
+/// A file with a `[target]`: whatever else it says is of no interest.
+#[derive(Deserialize)]
+struct TargetFile {
+    target: Option<TargetTable>,
+}
+
+impl Target {
+    /// The `[target]` of a file: a `session.toml`, or one with nothing but `schema` and that table.
+    ///
+    /// # Errors
+    /// Where it cannot be read, has no such table, or says something impossible; with file, line and remedy.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let document = Document::read(path)?;
+        let file: TargetFile = document.parse(SCHEMA)?;
+        let table = file.target.ok_or_else(|| {
+            document
+                .invalid("target", "is missing; describe the target there, as a session.toml does")
+        })?;
+        let session = Session {
+            target: Some(target_from_table(table)),
+            ..Session::new("", Kind::Swatch, "")
+        };
+        check_manifest(&session).map_err(|(key, what)| document.invalid(&key, &what))?;
+        Ok(session.target.unwrap_or_default())
+    }
+}
+
 impl Session {
     /// Reads a capture session: its folder, or the `session.toml` in it. Frames are not read yet.
     ///

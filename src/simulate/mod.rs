@@ -10,6 +10,7 @@ mod instrument;
 mod options;
 mod parts;
 mod scene;
+mod table;
 mod targets;
 mod truth;
 mod write;
@@ -18,6 +19,7 @@ pub use error::SimulateError;
 pub use instrument::Instrument;
 pub use options::{Flaws, Material, Options, Part, Targets};
 pub use scene::{SCENE_FILE, Scene};
+pub use table::{Laid, Lying, lay};
 
 use crate::files::{FileError, OutputKind, StagedFolder};
 use parts::Studio;

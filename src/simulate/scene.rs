@@ -1,6 +1,8 @@
-//! `scene.toml`: what stands before the simulated camera, so that a scan of a simulated rig photographs the same swatch.
+//! `scene.toml`: what stands before the simulated camera, so that a scan of a simulated rig photographs the same swatch, or the
+//! calibration target that lies in its place.
 
-use super::{Flaws, Instrument, Material, Options, SimulateError};
+use super::table::{TableTable, lying_from_table, table_from_lying};
+use super::{Flaws, Instrument, Lying, Material, Options, SimulateError};
 use crate::files::{Document, FileError, SCHEMA, write_toml};
 use crate::instrument::{Rig, RigLightPlace};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -26,6 +28,8 @@ pub struct Scene {
     pub flaws: Flaws,
     /// Where the lights are in truth; empty: where the rig says.
     pub places: Vec<RigLightPlace>,
+    /// What lies on the table.
+    pub table: Lying,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -34,6 +38,7 @@ struct SceneFile {
     schema: i64,
     #[serde(default = "first_seed")]
     seed: u64,
+    table: Option<TableTable>,
     #[serde(default)]
     material: MaterialTable,
     #[serde(default)]
@@ -99,6 +104,7 @@ impl Scene {
             material: options.material.clone(),
             flaws: Flaws { ruler_error_mm: 0.0, exposure_factor: 1.0, ..options.flaws.clone() },
             places: instrument.stage.lights.iter().map(place).collect(),
+            table: Lying::Swatch,
         }
     }
 
@@ -110,7 +116,8 @@ impl Scene {
         let path = rig.with_file_name(SCENE_FILE);
         if !path.exists() {
             let Options { seed, material, flaws, .. } = Options::default();
-            return Ok(Self { rig: rig.to_owned(), seed, material, flaws, places: Vec::new() });
+            let (rig, places) = (rig.to_owned(), Vec::new());
+            return Ok(Self { rig, seed, material, flaws, places, table: Lying::Swatch });
         }
         let scene = scene_from_document(&Document::read(&path)?, rig)?;
         scene.options().check()?;
@@ -149,7 +156,8 @@ impl Scene {
         self.options().fabric()
     }
 
-    fn options(&self) -> Options {
+    /// What the simulation makes of it.
+    pub(super) fn options(&self) -> Options {
         Options {
             rig: Some(self.rig.clone()),
             seed: self.seed,
@@ -172,6 +180,7 @@ fn scene_from_document(document: &Document, rig: &Path) -> Result<Scene, FileErr
         material: material(document, &file.material)?,
         flaws: flaws(&file.flaws),
         places: places.collect::<Result<_, _>>()?,
+        table: lying_from_table(document, file.table.as_ref())?,
     })
 }
 
@@ -266,6 +275,7 @@ fn file_from_scene(scene: &Scene) -> SceneFile {
     SceneFile {
         schema: SCHEMA,
         seed: scene.seed,
+        table: table_from_lying(scene.table),
         material: MaterialTable {
             preset: Some(material.preset.name().to_owned()),
             structure: material.structure.map(|structure| structure.name().to_owned()),
@@ -297,7 +307,8 @@ mod tests {
         options.flaws.swapped = Some([1, 2]);
         options.flaws.ruler_error_mm = 8.0;
         let instrument = Instrument::from_options(&options).unwrap();
-        let scene = Scene::of(&options, &instrument);
+        let mut scene = Scene::of(&options, &instrument);
+        scene.table = Lying::Board { pose: 3 };
         scene.save(folder.path()).unwrap();
         let rig = folder.path().join("rig.toml");
         let read = Scene::beside(&rig).unwrap();
@@ -319,5 +330,8 @@ mod tests {
         check("schema = 1\n[[lights]]\n", "needs position_mm");
         check("schema = 1\n[flaws]\nprnu = 3.0\n", "--prnu is 3");
         check("schema = 2\n", "schema 2");
+        check("schema = 1\n[table]\nlies = \"cat\"\n", "swatch, board, grey or white");
+        check("schema = 1\n[table]\nlies = \"board\"\npose = 99\n", "poses 0 to 15");
+        check("schema = 1\n[table]\nlies = \"white\"\ntilt_deg = 80.0\n", "0 to 45");
     }
 }

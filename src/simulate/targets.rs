@@ -47,7 +47,8 @@ pub(super) fn sheet_poses(options: &Options) -> Vec<(String, IsometryMatrix3<f64
     sheet_frames(targets.tilts, targets.tilt_deg, targets.raised_mm)
 }
 
-/// The white sheet, with a strip of chessboard that can be seen whole in all its poses.
+/// The white sheet, with a strip of chessboard that can be seen whole in all its poses; `pose`: keys what changes from one to
+/// the next.
 pub(super) fn sheet(options: &Options, view: &View, pose: usize) -> Result<Sheet, SimulateError> {
     let poses: Vec<_> = sheet_poses(options).into_iter().map(|(_, pose)| pose).collect();
     let strip = strip_for(view, &poses)

@@ -3,6 +3,8 @@
 use crate::laboratory::{Laboratory, SMALL};
 use assert_cmd::Command;
 use std::path::Path;
+use weavelight::session::Session;
+use weavelight::simulate::{self, Lying, Part};
 
 struct Said {
     status: Option<i32>,
@@ -69,6 +71,40 @@ fn a_bracket_is_merged_by_the_solve() {
 }
 
 #[test]
+fn targets_are_photographed_and_calibrate() {
+    let laboratory = Laboratory::new([156, 104], |options| {
+        options.only = vec![Part::Grey];
+    });
+    let home = laboratory.home.path();
+    let rig = home.join("rig/rig.toml");
+    simulate::lay(&rig, Lying::Board { pose: 0 }).unwrap();
+    let call = "scan --rig rig/rig.toml --kind board --board 9x6x25 --light 3 --out b --json";
+    assert_eq!(json(home, call)["frames"], 1);
+    simulate::lay(&rig, Lying::Board { pose: 1 }).unwrap();
+    assert_eq!(json(home, call)["frames"], 2);
+    let board = std::fs::read_to_string(home.join("b/session.toml")).unwrap();
+    assert!(board.contains("kind = \"board\"") && board.contains("pose = \"table\""), "{board}");
+
+    simulate::lay(&rig, Lying::Grey).unwrap();
+    let call = "scan --rig rig/rig.toml --kind grey --target rig/grey/session.toml --out g --json";
+    let done = json(home, call);
+    assert_eq!((&done["frames"], &done["warnings"]), (&18.into(), &serde_json::json!([])));
+    let measured = json(home, "calibrate color --rig rig/rig.toml g --out own --json");
+    assert!(measured["nonlinearity"].as_f64().unwrap() < 0.01, "{measured}");
+    assert!(measured["camera_to_linear_srgb"].is_array(), "{measured}");
+
+    simulate::lay(&rig, Lying::White { height_mm: 100.0, tilt_deg: 0.0, towards_deg: 0.0 })
+        .unwrap();
+    let call =
+        "scan --rig rig/rig.toml --kind white --thickness-mm 100 --reflectance 0.98 --out w --json";
+    let done = json(home, call);
+    assert_eq!((&done["frames"], &done["warnings"]), (&12.into(), &serde_json::json!([])));
+    let sheet = Session::load(&home.join("w")).unwrap();
+    assert_eq!(sheet.plane.unwrap().point_mm.z, 100.0);
+    assert_eq!(sheet.target.unwrap().reflectance, Some(0.98));
+}
+
+#[test]
 fn what_is_wrong_with_a_call_is_told() {
     let laboratory = Laboratory::new(SMALL, |_| ());
     let home = laboratory.home.path();
@@ -97,6 +133,15 @@ fn what_is_wrong_with_a_call_is_told() {
     check("scan --rig rig/mixed.toml --out s", 1, "sees simulated lights only; set [controller]");
     check("scan --rig rig/channel.toml --out s", 1, "light 4 is on channel 40; a light board has");
     check("scan --rig rig/rig.toml --out s --bracket 1", 2, "--bracket: 1 makes no sense; give");
+    let rig = |rest: &str| format!("scan --rig rig/rig.toml --out s {rest}");
+    check(&rig("--kind board"), 2, "--kind board: describe it with --board 9x6x25");
+    check(&rig("--kind board --board 9by6"), 2, "as in 9x6x25");
+    check(&rig("--kind board --board 9x6x25 --light 12"), 2, "--light is 12; the rig has lights");
+    check(&rig("--kind grey"), 2, "--kind grey: name the patches with --target");
+    check(&rig("--kind grey --target rig/rig.toml"), 1, "`target` is missing; describe");
+    check(&rig("--light 2"), 2, "--light goes with --preview or --kind board; leave");
+    check(&rig("--plane-point 0,0,60"), 2, "--plane-point goes with --kind white; leave it out");
+    check(&rig("--kind white --plane-normal 0,0,-1"), 2, "does not point to the camera; its z");
     check("scan --rig rig/rig.toml --out s --exposure-s 900", 2, "--exposure-s is 900; give");
     check(
         "scan --rig rig/rig.toml --preview --light 10",

@@ -10,7 +10,7 @@ use weavelight::device::board::{Board, PortChoice};
 use weavelight::device::camera::{
     Applied, Camera, CameraError, Description, Eyes, Settings, Shutter, SimulatedCamera,
 };
-use weavelight::device::scan::{About, Begin, Control, Options, ScanError, Summary, scan};
+use weavelight::device::scan::{About, Begin, Control, Options, ScanError, Subject, Summary, scan};
 use weavelight::files::sha256_of_file;
 use weavelight::instrument::Rig;
 use weavelight::session::Session;
@@ -98,6 +98,7 @@ impl Laboratory {
     pub(crate) fn options(&self, begin: Begin) -> Options {
         Options {
             folder: self.path("session"),
+            subject: Subject::Swatch,
             about: About { name: Some("linen".to_owned()), thickness_mm: None },
             begin,
             exposure_s: Some(SETTINGS.exposure_s),

@@ -18,4 +18,5 @@ mod faults;
 mod kills;
 mod laboratory;
 mod table;
+mod targets;
 mod timing;

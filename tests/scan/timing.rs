@@ -9,7 +9,7 @@ use weavelight::device::board::{Board, PortChoice};
 use weavelight::device::camera::{
     Applied, Camera, CameraError, Description, Release, Settings, Shutter,
 };
-use weavelight::device::scan::{About, Begin, Control, Options, scan};
+use weavelight::device::scan::{About, Begin, Control, Options, Subject, scan};
 use weavelight::session::Session;
 
 /// Full size, as the reference camera's.
@@ -80,6 +80,7 @@ fn ten_full_size_frames() {
     };
     let options = Options {
         folder: laboratory.path("session"),
+        subject: Subject::Swatch,
         about: About { name: None, thickness_mm: None },
         begin: Begin::Anew,
         exposure_s: Some(exposure_s),

@@ -8,4 +8,4 @@ mod sheet;
 pub use board::{BoardShape, board_poses};
 pub use chart::{COLOR_PATCHES, Chart, ChartPatch};
 pub use panel::{Art, Panel};
-pub use sheet::{Sheet, SheetFlaws, sheet_frames, strip_for};
+pub use sheet::{Sheet, SheetFlaws, TILTED_HEIGHT_MM, sheet_frames, sheet_pose, strip_for};

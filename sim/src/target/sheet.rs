@@ -36,7 +36,7 @@ const DUST: [f32; 3] = [0.35; 3];
 /// Cells in which at most one speck lies, millimetres.
 const DUST_CELL_MM: f64 = 4.0;
 /// Height of a tilted sheet's middle: its lower edge is just over the table.
-const TILTED_HEIGHT_MM: f64 = 60.0;
+pub const TILTED_HEIGHT_MM: f64 = 60.0;
 /// Where the hand's shadow ends, and over how many millimetres.
 const HAND_RADIUS_MM: f64 = 55.0;
 const HAND_SOFTNESS_MM: f64 = 12.0;
@@ -125,21 +125,28 @@ pub fn sheet_frames(
     tilt_deg: f64,
     raised_mm: f64,
 ) -> Vec<(String, IsometryMatrix3<f64>)> {
-    let level = |height: f64| {
-        IsometryMatrix3::from_parts(Translation3::new(0.0, 0.0, height), Rotation3::identity())
-    };
+    let level = |height_mm: f64| sheet_pose(height_mm, 0.0, 0.0);
     let tilted = |k: usize| {
-        let around = TAU * (k as f64 + 0.5) / tilts as f64;
-        let axis = UnitVector3::new_normalize(Vector3::new(-around.sin(), around.cos(), 0.0));
-        IsometryMatrix3::from_parts(
-            Translation3::new(0.0, 0.0, TILTED_HEIGHT_MM),
-            Rotation3::from_axis_angle(&axis, tilt_deg.to_radians()),
-        )
+        let towards_deg = 360.0 * (k as f64 + 0.5) / tilts as f64;
+        sheet_pose(TILTED_HEIGHT_MM, tilt_deg, towards_deg)
     };
     let mut frames =
         vec![("white-flat".to_owned(), level(0.0)), ("white-raised".to_owned(), level(raised_mm))];
     frames.extend((0..tilts).map(|k| (format!("white-tilt-{}", k + 1), tilted(k))));
     frames
+}
+
+/// A white sheet whose middle is `height_mm` over the table, tilted by `tilt_deg` so that it faces `towards_deg` (0: to the right of
+/// the picture, 90: to its top).
+pub fn sheet_pose(height_mm: f64, tilt_deg: f64, towards_deg: f64) -> IsometryMatrix3<f64> {
+    let (sin, cos) = towards_deg.to_radians().sin_cos();
+    let axis = UnitVector3::new_normalize(Vector3::new(-sin, cos, 0.0));
+    let rotation = if tilt_deg == 0.0 {
+        Rotation3::identity()
+    } else {
+        Rotation3::from_axis_angle(&axis, tilt_deg.to_radians())
+    };
+    IsometryMatrix3::from_parts(Translation3::new(0.0, 0.0, height_mm), rotation)
 }
 
 #[cfg(test)]

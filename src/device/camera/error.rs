@@ -151,12 +151,21 @@ pub enum CameraError {
     /// The picture cannot be stored here.
     #[error(transparent)]
     File(#[from] crate::files::FileError),
+    /// What lies before the simulated camera cannot be made out.
+    #[error(transparent)]
+    Scene(Box<crate::simulate::SimulateError>),
     /// Anything else: a sentence that says what to do.
     #[error("{what}")]
     Other {
         /// What is wrong; what to do.
         what: String,
     },
+}
+
+impl From<crate::simulate::SimulateError> for CameraError {
+    fn from(error: crate::simulate::SimulateError) -> Self {
+        Self::Scene(Box::new(error))
+    }
 }
 
 /// What may help after an error.

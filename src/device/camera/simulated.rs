@@ -3,12 +3,12 @@
 use super::{Applied, Camera, CameraError, Description, Release, Settings, Shutter};
 use crate::files::FileError;
 use crate::instrument::Rig;
-use crate::simulate::{Instrument, Scene, SimulateError};
+use crate::simulate::{Instrument, SCENE_FILE, Scene, SimulateError};
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use weavelight_sim::render::{Fabric, Shot, Signals, Stage, Subject, Tile, shoot};
+use weavelight_sim::render::{Shot, Signals, Stage, Subject, Tile, shoot};
 use weavelight_sim::sensor::Sensor;
 
 /// Which outputs of the light board are lit at this moment: bit n is output n.
@@ -23,14 +23,52 @@ const FIRST_SHOT: u64 = 1_000_000;
 
 /// A camera in software. Its exposures take as long as a real one's.
 pub struct SimulatedCamera {
-    scene: Scene,
-    fabric: Fabric,
-    instrument: Instrument,
-    /// Per output of the board: which light hangs on it in truth, if one does and shines.
-    light_of_output: Vec<(u32, Option<usize>)>,
+    before: Before,
+    /// Where to look what lies on the table now; `None`: what lay there first stays.
+    table: Option<Table>,
     eyes: Eyes,
     settings: Settings,
     shots: u64,
+}
+
+/// What stands before the camera.
+struct Before {
+    scene: Scene,
+    subject: Box<dyn Subject + Send>,
+    instrument: Instrument,
+    /// Per output of the board: which light hangs on it in truth, if one does and shines.
+    light_of_output: Vec<(u32, Option<usize>)>,
+}
+
+/// The table of a rig: `scene.toml` beside the rig's file says what lies on it.
+struct Table {
+    rig: Rig,
+    file: PathBuf,
+    /// What it said last.
+    said: Option<String>,
+}
+
+impl Before {
+    fn new(rig: &Rig, scene: Scene) -> Result<Self, SimulateError> {
+        let instrument = scene.instrument(rig)?;
+        let light_of_output = (0..rig.lights.len())
+            .map(|light| (rig.channel(light), scene.flaws.light_that_shines(light)))
+            .collect();
+        Ok(Self { subject: scene.subject(&instrument)?, scene, instrument, light_of_output })
+    }
+}
+
+impl Table {
+    /// What lies there, if that is not what lay there last.
+    fn look(&mut self) -> Result<Option<Before>, SimulateError> {
+        let said = std::fs::read_to_string(self.file.with_file_name(SCENE_FILE)).ok();
+        if said == self.said {
+            return Ok(None);
+        }
+        let before = Before::new(&self.rig, Scene::beside(&self.file)?)?;
+        self.said = said;
+        Ok(Some(before))
+    }
 }
 
 impl fmt::Debug for SimulatedCamera {
@@ -40,49 +78,54 @@ impl fmt::Debug for SimulatedCamera {
 }
 
 impl SimulatedCamera {
-    /// The camera of `rig`, over a swatch and with flaws as `scene` says.
+    /// The camera of `rig`, over what `scene` says and with its flaws, for ever.
     ///
     /// # Errors
     /// Where the rig does not say what a simulation needs.
     pub fn new(rig: &Rig, scene: Scene, eyes: Eyes) -> Result<Self, SimulateError> {
-        let instrument = scene.instrument(rig)?;
-        let light_of_output = (0..rig.lights.len())
-            .map(|light| (rig.channel(light), scene.flaws.light_that_shines(light)))
-            .collect();
-        Ok(Self {
-            fabric: scene.fabric(),
-            scene,
-            instrument,
-            light_of_output,
-            eyes,
-            settings: Settings { exposure_s: 0.5, iso: 100.0 },
-            shots: 0,
-        })
+        Ok(Self::over(Before::new(rig, scene)?, None, eyes))
+    }
+
+    /// The camera of `rig`, which is read from `file`, over whatever the scene beside the file says at each picture.
+    ///
+    /// # Errors
+    /// Where the rig does not say what a simulation needs, or the scene cannot be read.
+    pub fn over_table(rig: &Rig, file: &Path, eyes: Eyes) -> Result<Self, SimulateError> {
+        let said = std::fs::read_to_string(file.with_file_name(SCENE_FILE)).ok();
+        let before = Before::new(rig, Scene::beside(file)?)?;
+        let table = Table { rig: rig.clone(), file: file.to_owned(), said };
+        Ok(Self::over(before, Some(table), eyes))
+    }
+
+    fn over(before: Before, table: Option<Table>, eyes: Eyes) -> Self {
+        let settings = Settings { exposure_s: 0.5, iso: 100.0 };
+        Self { before, table, eyes, settings, shots: 0 }
     }
 
     /// How strongly each light contributes, given the outputs at both ends of the exposure.
     fn strengths(&self, open: u32, close: u32) -> Vec<(usize, f64)> {
-        let lights = self.instrument.stage.lights.len() as f64;
-        let drifted = 1.0 + self.scene.flaws.drift * (self.shots as f64 / (lights + 1.0)).min(1.0);
+        let lights = self.before.instrument.stage.lights.len() as f64;
+        let drifted =
+            1.0 + self.before.scene.flaws.drift * (self.shots as f64 / (lights + 1.0)).min(1.0);
         let share = |output: u32| {
             let lit = |pins: u32| f64::from(pins.checked_shr(output).unwrap_or(0) & 1);
             0.5 * (lit(open) + lit(close)) * drifted
         };
-        let lit = self.light_of_output.iter().filter_map(|&(output, light)| {
+        let lit = self.before.light_of_output.iter().filter_map(|&(output, light)| {
             Some((light?, share(output))).filter(|(_, share)| *share > 0.0)
         });
         lit.collect()
     }
 
     fn photograph(&self, open: u32, close: u32) -> Vec<u16> {
-        let Instrument { stage, sensor, .. } = &self.instrument;
+        let Instrument { stage, sensor, .. } = &self.before.instrument;
         let gain = self.settings.iso / 100.0;
         // The range ends at fewer electrons: shorter exposures have more noise.
         let sensor = Sensor { full_well_e: sensor.full_well_e / gain, ..sensor.clone() };
         let strengths = self.strengths(open, close);
         let lights = strengths.iter().map(|&(light, _)| stage.lights[light].clone()).collect();
         let lit = Lit {
-            fabric: &self.fabric,
+            subject: &*self.before.subject,
             stage: Stage { lights, ..stage.clone() },
             strengths: strengths.iter().map(|&(_, strength)| strength as f32).collect(),
         };
@@ -101,7 +144,7 @@ impl SimulatedCamera {
 
 impl Camera for SimulatedCamera {
     fn describe(&self) -> Description {
-        let model = self.instrument.rig.camera.model.clone();
+        let model = self.before.instrument.rig.camera.model.clone();
         Description {
             model: model.unwrap_or_else(|| "simulated camera".to_owned()),
             release: Release::Itself,
@@ -128,6 +171,9 @@ impl Camera for SimulatedCamera {
         folder: &Path,
         shutter: &mut dyn Shutter,
     ) -> Result<PathBuf, CameraError> {
+        if let Some(before) = self.table.as_mut().map(Table::look).transpose()?.flatten() {
+            self.before = before;
+        }
         shutter.open();
         let open = (self.eyes)();
         std::thread::sleep(Duration::from_secs_f64(self.settings.exposure_s));
@@ -138,6 +184,7 @@ impl Camera for SimulatedCamera {
         let path = folder.join(format!("SIM_{:04}.dng", self.shots));
         let now = Some(jiff::Timestamp::now());
         let written = self
+            .before
             .instrument
             .encode(&samples, exposure_s, iso, now)
             .and_then(|bytes| std::fs::write(&path, bytes));
@@ -147,9 +194,9 @@ impl Camera for SimulatedCamera {
     }
 }
 
-/// The fabric under several lights at once, as one lamp.
+/// The subject under several lights at once, as one lamp.
 struct Lit<'a> {
-    fabric: &'a Fabric,
+    subject: &'a dyn Subject,
     stage: Stage,
     strengths: Vec<f32>,
 }
@@ -162,7 +209,7 @@ impl Subject for Lit<'_> {
             ambient: blank,
             truth: None,
         };
-        self.fabric.expose(&self.stage, tile, &mut each);
+        self.subject.expose(&self.stage, tile, &mut each);
         for (light, strength) in each.lights.iter().zip(&self.strengths) {
             let sum = signals.lights[0].iter_mut().zip(light);
             sum.for_each(|(sum, light)| *sum += strength * light);

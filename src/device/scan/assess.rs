@@ -105,7 +105,7 @@ impl Assessor {
         let mean = lights.iter().sum::<f64>() / lights.len().max(1) as f64;
         (mean > 0.0 && ambient > ROOM_LIGHT * mean).then(|| {
             format!(
-                "With every LED off the swatch is {:.0} % as bright as under a light; darken the room.",
+                "With every LED off the picture is {:.0} % as bright as under a light; darken the room.",
                 100.0 * ambient / mean
             )
         })
@@ -116,7 +116,8 @@ impl Assessor {
             let frames = self.base_frames().map(|(_, step, look)| (step.name(), of(look)));
             frames.max_by(|a, b| a.1.total_cmp(&b.1))
         };
-        let bracketed = self.steps.iter().any(|step| step.factor < 1.0);
+        // One light at several exposures, as for a grey chart, is no bracket.
+        let bracketed = self.steps.iter().any(|step| step.factor < 1.0 && step.light != Some(0));
         let ((clipping, clipped), (brightest, high)) = (most(Look::clipped)?, most(Look::high)?);
         if clipped > CLIPPED && !bracketed {
             Some(format!(

@@ -43,6 +43,17 @@ pub enum ScanError {
         /// The first bad one.
         factor: f64,
     },
+    /// A bracket where the target's own exposures are what is wanted.
+    #[error("--bracket is for swatches and white sheets; leave it out")]
+    BracketOfTarget,
+    /// A light that the rig does not have.
+    #[error("--light is {light}; the rig has lights 0 to {last}")]
+    NoSuchLight {
+        /// What was asked for.
+        light: usize,
+        /// The last one.
+        last: usize,
+    },
     /// A bracket with a camera that cannot be set.
     #[error(
         "--bracket needs a camera that the program can set, but this one is set by hand; scan without it, or tether the camera"
@@ -70,7 +81,7 @@ pub enum ScanError {
         /// How many frames it has.
         frames: usize,
     },
-    /// The capture session that is to be resumed is another one.
+    /// The capture session that is to be resumed or added to is another one.
     #[error("{}: holds another capture session: {what}; choose another --out", .folder.display())]
     Another {
         /// The folder.

@@ -2,7 +2,7 @@
 //!
 //! [`Sequencer`] is the order of a scan as a state machine without input and output; [`scan`] drives it with a light board, a
 //! camera and a folder. Frames are looked at while the next is being taken: a light that stays dark is tried again. A
-//! scan that is killed at any moment resumes from its folder.
+//! scan that is killed at any moment resumes from its folder. Calibration targets are photographed in the same way ([`Subject`]).
 
 mod assess;
 mod control;
@@ -16,6 +16,7 @@ mod run;
 mod sequencer;
 mod shoot;
 mod store;
+mod subject;
 mod summary;
 
 pub use assess::Assessor;
@@ -30,4 +31,5 @@ pub use sequencer::{
     Action, Ending, Input, Judgement, MOST_ATTEMPTS, MOST_DARK, Sequencer, Trouble,
 };
 pub use store::{About, Begin};
+pub use subject::{Pose, Sheet, Subject};
 pub use summary::{Event, Seconds, Summary};

@@ -8,7 +8,6 @@ use crate::device::camera::{
     WatchedCamera, usb_cameras,
 };
 use crate::instrument::{CameraKind, Rig};
-use crate::simulate::Scene;
 use std::fmt;
 use std::path::Path;
 
@@ -107,7 +106,7 @@ fn open_camera(rig: &Rig, path: &Path, choice: &PortChoice) -> Result<Box<dyn Ca
         CameraKind::Simulated => {
             let PortChoice::Simulated(board) = choice.clone() else { return Err(ScanError::Blind) };
             let eyes = Box::new(move || board.pins());
-            Ok(Box::new(SimulatedCamera::new(rig, Scene::beside(path)?, eyes)?))
+            Ok(Box::new(SimulatedCamera::over_table(rig, path, eyes)?))
         }
         CameraKind::Watched { folder } => {
             let folder = path.parent().unwrap_or(Path::new(".")).join(folder);

@@ -5,17 +5,18 @@ use super::assess::Assessor;
 use super::control::{Control, Wish};
 use super::exposure::meter;
 use super::judge::{Judge, Seen};
-use super::plan::Plan;
+use super::plan::{Plan, Step};
 use super::sequencer::{Action, Ending, Input, Judgement, Sequencer, Trouble};
 use super::shoot::{Shot, Told, shoot};
 use super::store::{About, Begin, Store, Taken, check_room};
+use super::subject::Subject;
 use super::summary::{Event, Seconds, Summary};
 use crate::device::board::{Board, BoardError, Failure};
 use crate::device::camera::{Camera, CameraError, Cure, Release, Settings};
 use crate::files::FileError;
 use crate::instrument::Rig;
 use crate::raw;
-use crate::session::FrameEntry;
+use crate::session::{FrameEntry, Session};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -24,6 +25,8 @@ use std::time::{Duration, Instant};
 pub struct Options {
     /// The capture session's folder.
     pub folder: PathBuf,
+    /// What is photographed.
+    pub subject: Subject,
     /// What it will say.
     pub about: About,
     /// Whether it may be there already.
@@ -44,6 +47,11 @@ const BREATH: Duration = Duration::from_millis(300);
 const LOOK: Duration = Duration::from_millis(50);
 /// A file's exposure may differ from what was set by so much: cameras round.
 const EXPOSURE_SLACK: f64 = 1.15;
+/// Tilted by 20 degrees towards one light of a ring at 45 degrees of elevation, a sheet gets twice as much of it as of the
+/// opposite one.
+const UNKNOWN_LIE: f64 = 0.5;
+/// A camera that is set by hand keeps one exposure.
+const LINEARITY_BY_HAND: &str = "The sensor's linearity is not measured: this camera is set by hand. Tether it, or add frames of light 0 at several exposures to the capture session.";
 /// How a JPEG file begins.
 const JPEG: &[u8] = &[0xFF, 0xD8, 0xFF];
 /// Exposure times that make sense, seconds: longer than that, the board turns the light off.
@@ -51,7 +59,7 @@ const EXPOSURES_S: [f64; 2] = [1e-5, 45.0];
 /// Sensitivities that make sense.
 const ISOS: [f64; 2] = [25.0, 102_400.0];
 
-/// Scans a swatch. `tell` hears how it goes; `control` may pause or stop it.
+/// Scans a swatch, or photographs a calibration target. `tell` hears how it goes; `control` may pause or stop it.
 ///
 /// # Errors
 /// Where it cannot begin, or a frame cannot be taken. What is finished stays, and a scan that resumes goes on from there.
@@ -64,11 +72,16 @@ pub fn scan(
     tell: &dyn Fn(&Event),
 ) -> Result<Summary, ScanError> {
     let start = Instant::now();
-    let plan = check(rig, options, camera)?;
+    let (plan, left_out) = check(rig, options, camera)?;
     let size_px = [rig.camera.width_px, rig.camera.height_px];
     check_room(&options.folder, size_px, plan.steps.len())?;
-    let (store, found) = Store::open(&options.folder, &options.about, options.begin, &plan)?;
+    let whose = (&options.about, &options.subject);
+    let (store, mut found) = Store::open(&options.folder, whose, options.begin, &plan)?;
+    if left_out {
+        found.warnings.push(LINEARITY_BY_HAND.to_owned());
+    }
     let mut run = Run {
+        rig,
         sequencer: Sequencer::new(&plan, &found.finished),
         assessor: Assessor::new(&plan),
         judge: Judge::start(size_px),
@@ -99,14 +112,18 @@ pub fn scan(
     result
 }
 
-/// What can be seen to be wrong before anything moves.
-fn check(rig: &Rig, options: &Options, camera: &dyn Camera) -> Result<Plan, ScanError> {
+/// The plan, and whether exposures were left out of it; or what can be seen to be wrong before anything moves.
+fn check(rig: &Rig, options: &Options, camera: &dyn Camera) -> Result<(Plan, bool), ScanError> {
     in_range("--exposure-s", options.exposure_s.unwrap_or(1.0), EXPOSURES_S)?;
     in_range("--iso", options.iso, ISOS)?;
-    if !options.bracket.is_empty() && camera.describe().release == Release::Outside {
+    let by_hand = camera.describe().release == Release::Outside;
+    if !options.bracket.is_empty() && by_hand {
         return Err(ScanError::BracketByHand);
     }
-    Plan::new(rig, &options.bracket)
+    // What cannot be read is told when the capture session is opened.
+    let there = Session::load(&options.folder).map_or(Vec::new(), |session| session.frames);
+    let plan = Plan::of(rig, &options.subject, &options.bracket, &there)?;
+    Ok(if by_hand { plan.without_other_exposures() } else { (plan, false) })
 }
 
 fn in_range(option: &'static str, value: f64, [least, most]: [f64; 2]) -> Result<(), ScanError> {
@@ -118,6 +135,7 @@ fn in_range(option: &'static str, value: f64, [least, most]: [f64; 2]) -> Result
 }
 
 struct Run<'a> {
+    rig: &'a Rig,
     plan: Plan,
     options: &'a Options,
     board: &'a Board,
@@ -234,9 +252,16 @@ impl Run<'_> {
     }
 
     fn meter(&mut self) -> Result<Settings, ScanError> {
-        let first = self.plan.steps.iter().find_map(|step| Some((step.light?, step.output?)));
-        let place = first.unwrap_or((0, 0));
-        meter(self.board, self.camera, place, self.options.iso, self.store.incoming())
+        let (subject, about) = (&self.options.subject, &self.options.about);
+        let light = subject.metered_light(self.rig, about.thickness_mm);
+        let lit = |step: &&Step| step.light == Some(light);
+        let output = self.plan.steps.iter().find(lit).and_then(|step| step.output);
+        let place = (light, output.unwrap_or_default());
+        let settings =
+            meter(self.board, self.camera, place, self.options.iso, self.store.incoming())?;
+        // A sheet that nobody has measured may face any of the lights.
+        let room = if subject.lies_unknown(about.thickness_mm) { UNKNOWN_LIE } else { 1.0 };
+        Ok(Settings { exposure_s: settings.exposure_s * room, ..settings })
     }
 
     fn board_trouble(&mut self, step: usize, error: &BoardError) -> Trouble {
@@ -384,7 +409,12 @@ impl Run<'_> {
             pins_open: shot.open.map(|outputs| outputs.pins),
             pins_close: shot.close.map(|outputs| outputs.pins),
             board_ms: shot.open.map(|outputs| outputs.board_ms.into()),
-            ..FrameEntry::new("", self.plan.steps[step].light, settings.exposure_s, settings.iso)
+            ..FrameEntry::new(
+                "",
+                self.plan.steps[step].recorded_light(),
+                settings.exposure_s,
+                settings.iso,
+            )
         }
     }
 

@@ -2,13 +2,12 @@
 
 use super::ScanError;
 use super::plan::{Plan, Step};
+use super::subject::{Pose, Subject};
 use crate::device::camera::Settings;
 use crate::files::{FileError, free_bytes};
 use crate::session::{FrameEntry, Kind, MANIFEST, Session, SessionError, SessionWriter};
-use nalgebra::{Point3, Vector3};
 use std::fs;
 use std::path::{Path, PathBuf};
-use weavelight_calibration::description::Plane;
 
 /// Where the camera saves, inside the capture session's folder; gone when the scan is over.
 const INCOMING: &str = ".incoming";
@@ -20,7 +19,7 @@ const FRAME_EXTRA: u64 = 2 << 20;
 pub struct About {
     /// Its name; the folder's where absent.
     pub name: Option<String>,
-    /// How thick the swatch is: its plane lies this far over the table.
+    /// How thick the swatch is, or how far a sheet is raised: its plane lies this far over the table.
     pub thickness_mm: Option<f64>,
 }
 
@@ -67,7 +66,7 @@ impl Store {
     /// Begins or continues the capture session in `folder`.
     pub(super) fn open(
         folder: &Path,
-        about: &About,
+        (about, subject): (&About, &Subject),
         begin: Begin,
         plan: &Plan,
     ) -> Result<(Self, Found), ScanError> {
@@ -78,10 +77,10 @@ impl Store {
                 return Err(ScanError::Taken { folder: folder.to_owned(), name, frames });
             }
             (Some(session), Begin::Resume) => {
-                check_same(&session, about, plan)?;
+                check_same(&session, (about, subject), plan)?;
                 SessionWriter::resume(folder)?
             }
-            (None, _) => SessionWriter::create(new_session(folder, about))?,
+            (None, _) => SessionWriter::create(new_session(folder, about, subject))?,
         };
         let incoming = folder.join(INCOMING);
         let failed = |source| FileError::write(&incoming, source);
@@ -104,6 +103,11 @@ impl Store {
             else {
                 continue;
             };
+            // A board that lies better now is photographed anew; the earlier picture stays until then.
+            if step.board.is_some() {
+                self.files[k] = Some(entry.file);
+                continue;
+            }
             match session.read_frame(&entry) {
                 Ok(_) => {
                     self.files[k] = Some(entry.file);
@@ -148,7 +152,9 @@ impl Store {
         let name = |tag: &str| PathBuf::from(format!("{}{tag}.{ending}", step.stem));
         let names = std::iter::once(name("")).chain((2..).map(|k| name(&format!("-take-{k}"))));
         let file = names.into_iter().find(|name| old.as_ref() != Some(name)).unwrap_or(name(""));
-        let entry = FrameEntry { file: file.clone(), drift_check: step.drift_check, ..taken.entry };
+        let pose = step.board.filter(|pose| *pose == Pose::Table).map(|_| "table".to_owned());
+        let drift_check = step.drift_check;
+        let entry = FrameEntry { file: file.clone(), drift_check, pose, ..taken.entry };
         self.writer.adopt(entry, taken.path, taken.bytes, old.as_deref())?;
         self.files[taken.step] = Some(file);
         Ok(())
@@ -177,31 +183,38 @@ impl Drop for Store {
     }
 }
 
-fn new_session(folder: &Path, about: &About) -> Session {
+fn new_session(folder: &Path, about: &About, subject: &Subject) -> Session {
     let named = || folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = about.name.clone().or_else(named).unwrap_or_else(|| "unnamed".to_owned());
     Session {
         captured: Some(jiff::Timestamp::now()),
-        plane: about.thickness_mm.map(level_plane),
-        ..Session::new(folder, Kind::Swatch, name)
+        plane: subject.plane(about.thickness_mm),
+        target: subject.target(),
+        ..Session::new(folder, subject.kind(), name)
     }
 }
 
-fn level_plane(thickness_mm: f64) -> Plane {
-    Plane { point_mm: Point3::new(0.0, 0.0, thickness_mm), normal: Vector3::z_axis() }
-}
-
-fn check_same(session: &Session, about: &About, plan: &Plan) -> Result<(), ScanError> {
+fn check_same(
+    session: &Session,
+    (about, subject): (&About, &Subject),
+    plan: &Plan,
+) -> Result<(), ScanError> {
     let another = |what| Err(ScanError::Another { folder: session.folder.clone(), what });
-    if session.kind != Kind::Swatch {
-        return another("it is no scan of a swatch".to_owned());
+    if session.kind != subject.kind() {
+        return another(format!("it is no scan of {}", name_of(subject.kind())));
+    }
+    if session.target != subject.target() {
+        return another("its [target] is another one".to_owned());
     }
     if let Some(name) = about.name.as_ref().filter(|name| **name != session.name) {
         return another(format!("it is named {:?}, not {name:?}", session.name));
     }
-    let wanted = about.thickness_mm.map(level_plane);
+    let wanted = subject.plane(about.thickness_mm);
     if wanted.is_some() && wanted != session.plane {
-        return another("its plane is not at the given --thickness-mm".to_owned());
+        return another("its plane is not at the given --thickness-mm or --plane-point".to_owned());
+    }
+    if session.kind == Kind::Board {
+        return Ok(()); // all pictures of one board go together
     }
     let strange =
         session.frames.iter().find(|entry| !plan.steps.iter().any(|step| is_of(entry, step)));
@@ -214,10 +227,21 @@ fn check_same(session: &Session, about: &About, plan: &Plan) -> Result<(), ScanE
     }
 }
 
+fn name_of(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Swatch => "a swatch",
+        Kind::White => "a white sheet",
+        Kind::Grey => "a grey chart",
+        Kind::Board => "a chessboard",
+    }
+}
+
 fn is_of(entry: &FrameEntry, step: &Step) -> bool {
     let stem = entry.file.file_stem().unwrap_or_default().to_string_lossy();
     let stem = stem.split_once("-take-").map_or(&*stem, |(stem, _)| stem);
-    stem == step.stem && entry.light == step.light && entry.drift_check == step.drift_check
+    stem == step.stem
+        && entry.light == step.recorded_light()
+        && entry.drift_check == step.drift_check
 }
 
 /// Sees that the frames will fit on the disk, before anything is begun: those that are there already need no more room.
@@ -254,7 +278,7 @@ mod tests {
     }
 
     fn open(folder: &Path, begin: Begin) -> Result<(Store, Found), ScanError> {
-        Store::open(folder, &ABOUT, begin, &plan())
+        Store::open(folder, (&ABOUT, &Subject::Swatch), begin, &plan())
     }
 
     fn keep(store: &mut Store, step: usize, content: &str) {
@@ -319,7 +343,8 @@ mod tests {
         keep(&mut store, 9, "one");
         drop(store);
         let check = |about: About, plan: &Plan, expected: &str| {
-            let error = Store::open(home.path(), &about, Begin::Resume, plan).unwrap_err();
+            let whose = (&about, &Subject::Swatch);
+            let error = Store::open(home.path(), whose, Begin::Resume, plan).unwrap_err();
             assert!(error.to_string().contains(expected), "{error}");
         };
         check(About { name: Some("denim".into()), ..ABOUT }, &plan(), "not \"denim\"");
@@ -329,6 +354,49 @@ mod tests {
         check(ABOUT, &Plan::new(&fewer, &[]).unwrap(), "light-08.nef is no frame of this scan");
         fs::write(home.path().join(MANIFEST), "schema = 1\nkind = \"white\"\n").unwrap();
         check(ABOUT, &plan(), "no scan of a swatch");
+    }
+
+    #[test]
+    fn pictures_of_a_board_come_one_by_one() {
+        let home = tempfile::tempdir().unwrap();
+        let board = crate::session::Board { columns: 9, rows: 6, square_mm: 25.0 };
+        let picture = |pose: Pose, content: &str| {
+            let subject = Subject::Board { board, pose, light: 0 };
+            let there = Session::load(home.path()).map_or(Vec::new(), |session| session.frames);
+            let plan = Plan::of(&reference_rig(), &subject, &[], &there).unwrap();
+            let whose = (&ABOUT, &subject);
+            let (mut store, found) = Store::open(home.path(), whose, Begin::Resume, &plan).unwrap();
+            assert!(found.finished.is_empty());
+            let path = store.incoming().join("DSC_1.NEF");
+            fs::write(&path, content).unwrap();
+            let entry = FrameEntry::new("", None, 0.1, 100.0);
+            let taken = Taken { step: 0, path: &path, bytes: content.as_bytes(), entry };
+            store.keep(&plan, taken).unwrap();
+            let session = Session::load(home.path()).unwrap();
+            assert_eq!((session.kind, session.target.unwrap().board), (Kind::Board, Some(board)));
+            let said = |entry: &FrameEntry| {
+                let bytes = fs::read_to_string(home.path().join(&entry.file)).unwrap();
+                (bytes, entry.pose.clone())
+            };
+            session.frames.iter().map(said).collect::<Vec<_>>()
+        };
+        let table = || Some("table".to_owned());
+        picture(Pose::Table, "flat");
+        picture(Pose::Free, "left");
+        let all = picture(Pose::Free, "right");
+        let expected =
+            [("flat".to_owned(), table()), ("left".to_owned(), None), ("right".to_owned(), None)];
+        assert_eq!(all, expected);
+        // Laid flat again: the new picture is the table's, and there is no other.
+        let all = picture(Pose::Table, "flatter");
+        assert_eq!(all.len(), 3);
+        assert!(all.contains(&("flatter".to_owned(), table())), "{all:?}");
+        let other = crate::session::Board { square_mm: 20.0, ..board };
+        let subject = Subject::Board { board: other, pose: Pose::Free, light: 0 };
+        let plan = Plan::of(&reference_rig(), &subject, &[], &[]).unwrap();
+        let whose = (&ABOUT, &subject);
+        let error = Store::open(home.path(), whose, Begin::Resume, &plan).unwrap_err().to_string();
+        assert!(error.contains("its [target] is another one"), "{error}");
     }
 
     #[test]
