@@ -10,7 +10,7 @@ use crate::worker::{Outbox, Tools, Update, instruments::with_instruments};
 use std::path::Path;
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{
-    About, Begin, Event, Options, Preview, ScanError, Summary, preview, scan,
+    About, Begin, Event, Options, Preview, ScanError, Subject, Summary, preview, scan,
 };
 use weavelight::report::page_of_solve;
 use weavelight::simulate::Scene;
@@ -80,6 +80,7 @@ fn scan_and_solve(order: &Order, tools: &mut Tools, out: &Outbox) {
 fn options(order: &Order, folder: &Path) -> Options {
     Options {
         folder: folder.to_owned(),
+        subject: Subject::Swatch,
         about: About { name: Some(order.name.clone()), thickness_mm: order.thickness_mm },
         begin: if order.resume { Begin::Resume } else { Begin::Anew },
         exposure_s: order.exposure_s,
