@@ -59,7 +59,7 @@ pub struct BoardReport {
     pub dropped: Option<String>,
 }
 
-const COVERAGE_GRID: [usize; 2] = [8, 6];
+pub(super) const COVERAGE_GRID: [usize; 2] = [8, 6];
 
 /// One picture to look for the board in.
 struct Picture<'a> {

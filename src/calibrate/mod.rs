@@ -13,6 +13,7 @@ mod frames;
 mod lights;
 mod moved;
 mod patches;
+mod seen;
 mod sheet;
 mod status;
 
@@ -21,6 +22,7 @@ pub use check::{CheckOptions, CheckReport, CheckedSheet, check};
 pub use color::{ColorOptions, ColorReport, color};
 pub use error::CalibrateError;
 pub use lights::{LightReport, LightsOptions, LightsReport, SheetReport, lights};
+pub use seen::{BoardsSoFar, SeenBoard, SeenSheet, boards_so_far, find_board, look_at_sheet};
 pub use status::{Status, Step, StepState, status};
 
 use crate::files::{FileError, Input, sha256_of_file};

@@ -119,7 +119,7 @@ pub(super) fn observe(
     Ok(Observed { sheet, warnings, brightest })
 }
 
-fn cell_side(camera: &Camera) -> usize {
+pub(super) fn cell_side(camera: &Camera) -> usize {
     // Even, so that every cell holds whole 2 x 2 cells of the mosaic.
     (camera.width_px.max(camera.height_px) / CELLS_ACROSS).max(LEAST_CELL_PX) & !1
 }

@@ -100,7 +100,7 @@ impl TargetArgs {
             }),
             Kind::Grey if target.patches.is_empty() => {
                 return Err(Failure::call(
-                    "--kind grey: name the patches with --target FILE.toml, a [target] table with [[target.patches]]",
+                    "--kind grey: the patches are not described; name them with --target FILE.toml, a [target] table with [[target.patches]]",
                 ));
             }
             Kind::Grey => Subject::Grey { patches: target.patches },
@@ -112,7 +112,7 @@ impl TargetArgs {
                     None => Pose::Free,
                 };
                 let board = board.ok_or_else(|| {
-                    Failure::call("--kind board: describe it with --board 9x6x25 (inner corners across and down, mm) or --target FILE.toml")
+                    Failure::call("--kind board: the board is not described; give --board 9x6x25 (inner corners across and down, mm) or --target FILE.toml")
                 })?;
                 Subject::Board { board, pose, light }
             }

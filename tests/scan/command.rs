@@ -134,10 +134,10 @@ fn what_is_wrong_with_a_call_is_told() {
     check("scan --rig rig/channel.toml --out s", 1, "light 4 is on channel 40; a light board has");
     check("scan --rig rig/rig.toml --out s --bracket 1", 2, "--bracket: 1 makes no sense; give");
     let rig = |rest: &str| format!("scan --rig rig/rig.toml --out s {rest}");
-    check(&rig("--kind board"), 2, "--kind board: describe it with --board 9x6x25");
+    check(&rig("--kind board"), 2, "the board is not described; give --board 9x6x25");
     check(&rig("--kind board --board 9by6"), 2, "as in 9x6x25");
     check(&rig("--kind board --board 9x6x25 --light 12"), 2, "--light is 12; the rig has lights");
-    check(&rig("--kind grey"), 2, "--kind grey: name the patches with --target");
+    check(&rig("--kind grey"), 2, "the patches are not described; name them with --target");
     check(&rig("--kind grey --target rig/rig.toml"), 1, "`target` is missing; describe");
     check(&rig("--light 2"), 2, "--light goes with --preview or --kind board; leave");
     check(&rig("--plane-point 0,0,60"), 2, "--plane-point goes with --kind white; leave it out");
