@@ -16,8 +16,10 @@ LINKER_PACKAGES := gcc libc6-dev
 OPENCV_PACKAGES := g++ pkg-config clang libclang-dev libopencv-dev
 # Tethered cameras are held by libgphoto2; its bindings are generated with clang.
 TETHER_PACKAGES := pkg-config clang libclang-dev libgphoto2-dev
-# The window, and the software driver that its tests draw with.
-WINDOW_PACKAGES := libvulkan1 mesa-vulkan-drivers libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 xvfb xdotool imagemagick
+# A graphics processor in software: what the solve's shaders are tested on, and what the window's tests draw with.
+VULKAN_PACKAGES := libvulkan1 mesa-vulkan-drivers
+# The window.
+WINDOW_PACKAGES := libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 xvfb xdotool imagemagick
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
@@ -27,7 +29,7 @@ packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
 
 packages-all:
-	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES) $(TETHER_PACKAGES) $(WINDOW_PACKAGES)
+	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES) $(TETHER_PACKAGES) $(WINDOW_PACKAGES) $(VULKAN_PACKAGES)
 
 packages-firmware:
 	@bash .ci/packages $(LINKER_PACKAGES) $(FIRMWARE_PACKAGES)

@@ -8,7 +8,8 @@
 //! - [`raw`]: a frame as the sensor wrote it
 //! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
 //!   [`solution`]: the folder that a solve writes
-//! - [`photometry`]: the kernels, on one band of rows; [`solve`]: the run around them
+//! - [`photometry`]: the kernels, on one band of rows; [`gpu`]: their first step on a graphics processor; [`solve`]: the run
+//!   around them
 //! - [`simulate`]: the simulated rig's folders
 //! - [`device`]: the light board, and what else the capture needs of the world
 //! - [`report`]: what a command tells; [`mod@bench`]: run time against error
@@ -21,6 +22,7 @@ pub mod demo;
 pub mod device;
 pub mod doctor;
 pub mod files;
+pub mod gpu;
 pub mod instrument;
 pub mod photometry;
 pub mod raster;

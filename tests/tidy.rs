@@ -96,6 +96,15 @@ fn opencv_stays_in_one_module() {
 }
 
 #[test]
+fn graphics_processors_stay_in_one_room() {
+    let found: Vec<String> = mentions("src", &["wgpu::", "bytemuck::"])
+        .into_iter()
+        .filter(|place| !place.contains("src/gpu/"))
+        .collect();
+    expect_none("only src/gpu speaks to graphics processors", &found);
+}
+
+#[test]
 fn rooms_use_only_the_rooms_below_them() {
     let check = |room: &str, forbidden: &[&str]| {
         let words: Vec<String> = forbidden.iter().map(|above| format!("crate::{above}")).collect();
@@ -109,8 +118,21 @@ fn rooms_use_only_the_rooms_below_them() {
     check("files", &[&top[..], &["raster", "raw", "session", "instrument"]].concat());
     check(
         "photometry",
-        &["files", "raster", "raw", "session", "instrument", "solution", "solve", "cli", "report"],
+        &[
+            "files",
+            "raster",
+            "raw",
+            "session",
+            "instrument",
+            "solution",
+            "solve",
+            "cli",
+            "report",
+            "gpu",
+        ],
     );
+    let below_gpu = ["files", "raster", "raw", "session", "instrument"];
+    check("gpu", &[&below_gpu[..], &["cli", "report", "calibrate", "solve", "solution"]].concat());
     check("raster", &[&top[..], &["session", "instrument"]].concat());
     check("raw", &[&top[..], &["session", "instrument"]].concat());
     check("session", &top);

@@ -85,16 +85,21 @@ impl Block {
         self.noise_of = None;
     }
 
-    /// Takes the place of neighbours, without their samples.
+    /// Takes the place of neighbours.
     #[inline(always)]
-    pub(crate) fn place(&mut self, input: &RowInput, columns: &Range<usize>) {
+    pub(crate) fn place(&mut self, columns: &Range<usize>) {
         self.len = columns.len();
         self.neighbours = true;
-        if columns.len() < LANES {
-            self.pad(input, columns);
-        }
         for k in 0..LANES {
             self.column[k] = columns.start + k;
+        }
+    }
+
+    /// Loads what the neighbours' way does not take from the row itself.
+    #[inline(always)]
+    pub(crate) fn load(&mut self, input: &RowInput, columns: &Range<usize>) {
+        if columns.len() < LANES {
+            self.pad(input, columns);
         }
         match input.noise_scale {
             Some(scale) => self.set_noise(columns.start, &scale[columns.clone()]),

@@ -6,6 +6,7 @@
 //! - [`normalise_row`]: raw numbers to input
 //! - [`estimate_noise`]: the noise model where the calibration has none
 //! - [`RowSolver`]: the same answers, fast
+//! - [`CutRow`] and [`Found`]: the fast path's first step, for whoever does it elsewhere
 
 #![allow(
     clippy::needless_range_loop,
@@ -14,6 +15,7 @@
 
 mod block;
 mod complete;
+mod elsewhere;
 mod least_squares;
 mod method;
 mod noise;
@@ -32,8 +34,10 @@ mod weighted;
 mod wide;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
+pub use elsewhere::{CutPiece, CutRow, Found};
+pub(crate) use method::chi_square_limit;
 pub use method::{MAX_LIGHTS, Method};
 pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};

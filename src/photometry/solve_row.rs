@@ -5,6 +5,7 @@ use pulp::Arch;
 
 use super::block::{Block, LANES, Lanes, Place, ZERO};
 use super::complete::{LeastSquares, Neighbours, Weighted};
+use super::elsewhere::{CutRow, Found};
 use super::least_squares::solve_masked;
 use super::method::{MOST_LENGTHENING, Method};
 use super::pieces::Pieces;
@@ -59,6 +60,40 @@ impl RowSolver {
             return Ok(());
         }
         self.pieces.cut(&input.field, output.outcome.len());
+        self.solve_cut(input, output, method, None);
+        Ok(())
+    }
+
+    /// Solves a row whose neighbours have been solved elsewhere, all but what these leave open.
+    ///
+    /// `cut` is how the row was cut for that; it is as it was afterwards.
+    ///
+    /// # Errors
+    /// As [`RowSolver::solve`].
+    pub fn solve_rest(
+        &mut self,
+        input: &RowInput,
+        output: &mut RowOutput,
+        method: Method,
+        (cut, found): (&mut CutRow, &Found),
+    ) -> Result<(), RowError> {
+        check_shapes(input, output)?;
+        cut.check_shape(input.field.lights, output.outcome.len())?;
+        found.check_lengths(output.outcome.len())?;
+        std::mem::swap(&mut self.pieces, &mut cut.0);
+        self.solve_cut(input, output, method, Some(found));
+        std::mem::swap(&mut self.pieces, &mut cut.0);
+        Ok(())
+    }
+
+    /// Solves the row that the pieces were cut from.
+    fn solve_cut(
+        &mut self,
+        input: &RowInput,
+        output: &mut RowOutput,
+        method: Method,
+        found: Option<&Found>,
+    ) {
         self.block.reset(input);
         self.weights.resize(input.field.lights, ZERO);
         self.queues.apart.clear();
@@ -73,7 +108,7 @@ impl RowSolver {
                     let places = columns.map(|column| Place { column, piece: index });
                     self.queues.suspect.extend(places);
                 }
-                _ => self.neighbours(index, input, output, method),
+                _ => self.neighbours(index, input, output, (method, found)),
             }
         }
         self.apart(input, output, method);
@@ -82,30 +117,32 @@ impl RowSolver {
             let pixel = solve_column(input, column, method);
             output.write(column, &pixel);
         }
-        Ok(())
     }
 
-    /// Solves a piece, a block of neighbours at a time.
+    /// Solves a piece, a block of neighbours at a time; or takes over what was found of it.
     fn neighbours(
         &mut self,
         index: usize,
         input: &RowInput,
         output: &mut RowOutput,
-        method: Method,
+        (method, found): (Method, Option<&Found>),
     ) {
         let piece = &self.pieces.list[index];
         for start in (piece.start..piece.end).step_by(LANES) {
             let columns = start..piece.end.min(start + LANES);
-            self.block.place(input, &columns);
+            self.block.place(&columns);
+            let found = found.filter(|found| found.is_decided(&columns));
+            if found.is_none() {
+                self.block.load(input, &columns);
+            }
             let at = Neighbours { block: &self.block, pieces: &self.pieces, piece, input };
             let surface = &mut self.surface;
-            match method {
-                Method::LeastSquares => {
-                    surface.most_lengthening = 0.0;
-                    self.arch.dispatch(LeastSquares { at, surface });
-                }
-                _ => {
-                    surface.most_lengthening = MOST_LENGTHENING as f32;
+            let plain = method == Method::LeastSquares;
+            surface.most_lengthening = if plain { 0.0 } else { MOST_LENGTHENING as f32 };
+            match found {
+                Some(found) => found.load(&columns, input.field.lights, surface),
+                None if plain => self.arch.dispatch(LeastSquares { at, surface }),
+                None => {
                     self.arch.dispatch(Weighted { at, surface, weights: &mut self.weights });
                 }
             }

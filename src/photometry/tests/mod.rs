@@ -4,5 +4,5 @@ mod accuracy;
 mod agreement;
 mod noise;
 mod real;
-pub(super) mod scene;
+pub(crate) mod scene;
 mod stress;

@@ -1,0 +1,32 @@
+/// Why there is no answer from a graphics processor.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GpuError {
+    /// Built without the feature.
+    #[error(
+        "this program was built without its GPU part; build it with `cargo build --release --features gpu`, or leave --device gpu out"
+    )]
+    NotBuilt,
+    /// No adapter.
+    #[error(
+        "no Vulkan device was found; install the graphics card's Vulkan driver (Debian: mesa-vulkan-drivers, which also has one in software), or leave --device gpu out"
+    )]
+    NoAdapter,
+    /// The adapter refuses to work.
+    #[error(
+        "{adapter} cannot be used ({why}); update its Vulkan driver, or leave --device gpu out"
+    )]
+    Unusable {
+        /// Its name.
+        adapter: String,
+        /// What the driver says.
+        why: String,
+    },
+    /// It stopped working.
+    #[error("{adapter} failed ({why})")]
+    Failed {
+        /// Its name.
+        adapter: String,
+        /// What the driver says.
+        why: String,
+    },
+}

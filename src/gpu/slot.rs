@@ -1,0 +1,177 @@
+//! The buffers of one tile in flight: up, on the device, and down.
+
+use super::pack::Packed;
+use super::{Answer, Gpu, GpuError, Tile};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+use wgpu::{BufferUsages as Usages, MapMode, PollType};
+
+/// A driver that takes longer for a tile hangs.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Workgroups that a dimension may have.
+const MOST_GROUPS: usize = 65_535;
+/// Buffers grow in such steps.
+const GRAIN: usize = 1 << 20;
+
+/// Buffers, used again and again.
+#[derive(Default)]
+pub(super) struct Slot {
+    buffers: Option<Buffers>,
+}
+
+struct Buffers {
+    /// Mapped for writing while no tile is in flight.
+    up: wgpu::Buffer,
+    input: wgpu::Buffer,
+    found: wgpu::Buffer,
+    down: wgpu::Buffer,
+}
+
+/// A tile on its way.
+pub struct Flight<'g> {
+    gpu: &'g Gpu,
+    slot: Slot,
+    packed: Packed,
+    submission: wgpu::SubmissionIndex,
+    /// How mapping went, for what goes up next time and for what comes down.
+    mapped: Receiver<Result<(), wgpu::BufferAsyncError>>,
+}
+
+impl Slot {
+    /// Writes a tile where the device can copy it from.
+    pub(super) fn fill(&mut self, gpu: &Gpu, tile: &Tile, packed: &Packed) -> Result<(), GpuError> {
+        let up_bytes = packed.regions().map(|region| region.end).into_iter().fold(0, usize::max);
+        let buffers = self.buffers_for(gpu, up_bytes, packed.found_bytes().max(size_of::<f32>()));
+        {
+            let view = buffers.up.get_mapped_range_mut(..);
+            let mut view = view.map_err(|error| gpu.failed(&error))?;
+            packed.write(tile, |at, bytes| {
+                view.slice(at..at + bytes.len()).copy_from_slice(bytes);
+            });
+        }
+        buffers.up.unmap();
+        Ok(())
+    }
+
+    fn buffers_for(&mut self, gpu: &Gpu, up: usize, down: usize) -> &Buffers {
+        let fits = self
+            .buffers
+            .take()
+            .filter(|buffers| buffers.up.size() >= up as u64 && buffers.down.size() >= down as u64);
+        self.buffers.insert(fits.unwrap_or_else(|| Buffers::new(&gpu.device, up, down)))
+    }
+
+    /// Copies up, solves, copies down.
+    pub(super) fn launch<'g>(
+        self,
+        gpu: &'g Gpu,
+        pipeline: &wgpu::ComputePipeline,
+        packed: Packed,
+    ) -> Flight<'g> {
+        let (told, mapped) = channel();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        if let Some(buffers) = &self.buffers {
+            buffers.record(gpu, pipeline, &packed, &mut encoder);
+        }
+        let submission = gpu.queue.submit([encoder.finish()]);
+        if let Some(buffers) = &self.buffers {
+            for (buffer, mode) in [(&buffers.up, MapMode::Write), (&buffers.down, MapMode::Read)] {
+                let told = told.clone();
+                // Nobody listens where the flight was dropped.
+                buffer.map_async(mode, .., move |result| drop(told.send(result)));
+            }
+        }
+        Flight { gpu, slot: self, packed, submission, mapped }
+    }
+}
+
+impl Buffers {
+    fn new(device: &wgpu::Device, up: usize, down: usize) -> Self {
+        let (up, down) = (up.next_multiple_of(GRAIN), down.next_multiple_of(GRAIN));
+        let buffer = |bytes: usize, usage: Usages, mapped_at_creation: bool| {
+            let size = bytes as u64;
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size,
+                usage,
+                mapped_at_creation,
+            })
+        };
+        let on_device = Usages::UNIFORM | Usages::STORAGE | Usages::COPY_DST;
+        Self {
+            up: buffer(up, Usages::MAP_WRITE | Usages::COPY_SRC, true),
+            input: buffer(up, on_device, false),
+            found: buffer(down, Usages::STORAGE | Usages::COPY_SRC, false),
+            down: buffer(down, Usages::MAP_READ | Usages::COPY_DST, false),
+        }
+    }
+
+    fn record(
+        &self,
+        gpu: &Gpu,
+        pipeline: &wgpu::ComputePipeline,
+        packed: &Packed,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let regions = packed.regions();
+        for region in &regions {
+            let (at, bytes) = (region.start as u64, region.len() as u64);
+            encoder.copy_buffer_to_buffer(&self.up, at, &self.input, at, bytes);
+        }
+        let binding = |(binding, region): (u32, &std::ops::Range<usize>)| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: &self.input,
+                offset: region.start as u64,
+                size: std::num::NonZeroU64::new(region.len() as u64),
+            }),
+        };
+        let mut entries: Vec<wgpu::BindGroupEntry> = (0..).zip(&regions).map(binding).collect();
+        entries.push(wgpu::BindGroupEntry {
+            binding: regions.len() as u32,
+            resource: self.found.as_entire_binding(),
+        });
+        let layout = &gpu.layout;
+        let descriptor = wgpu::BindGroupDescriptor { label: None, layout, entries: &entries };
+        let bindings = gpu.device.create_bind_group(&descriptor);
+        let across = packed.workgroups().clamp(1, MOST_GROUPS);
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &bindings, &[]);
+        pass.dispatch_workgroups(across as u32, packed.workgroups().div_ceil(across) as u32, 1);
+        drop(pass);
+        let bytes = packed.found_bytes() as u64;
+        encoder.copy_buffer_to_buffer(&self.found, 0, &self.down, 0, bytes);
+    }
+}
+
+impl Flight<'_> {
+    /// Waits for the answer and hands it to `read`.
+    ///
+    /// # Errors
+    /// Where the driver fails or hangs.
+    pub fn land<T>(self, read: impl FnOnce(&Answer) -> T) -> Result<T, GpuError> {
+        let Self { gpu, slot, packed, submission, mapped } = self;
+        let wait = PollType::Wait { submission_index: Some(submission), timeout: Some(PATIENCE) };
+        let waited = gpu.device.poll(wait);
+        if let Some(why) = gpu.complaint() {
+            return Err(gpu.failed(&why));
+        }
+        waited.map_err(|error| gpu.failed(&error))?;
+        for _ in 0..2 {
+            let result = mapped.recv_timeout(PATIENCE).map_err(|error| gpu.failed(&error))?;
+            result.map_err(|error| gpu.failed(&error))?;
+        }
+        let Some(buffers) = &slot.buffers else { return Err(gpu.failed(&"no buffers")) };
+        let value = {
+            let bytes = packed.found_bytes() as u64;
+            let view = buffers.down.get_mapped_range(0..bytes.max(4));
+            let view = view.map_err(|error| gpu.failed(&error))?;
+            let values = bytemuck::try_cast_slice(&view).map_err(|error| gpu.failed(&error))?;
+            read(&Answer { values, before: &packed.before })
+        };
+        buffers.down.unmap();
+        gpu.give_back(slot);
+        Ok(value)
+    }
+}
