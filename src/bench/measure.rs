@@ -44,9 +44,12 @@ pub(super) fn of_set(
     let (touches, runs) =
         Rows::with(&set.scene, |rows| take_turns(set, rows, contenders, step, effort))??;
     let touched = Spent::median(&touches);
-    let points: Vec<[f64; 2]> = runs
+    let points: Vec<[f64; 2]> = contenders
         .iter()
-        .map(|runs| [Spent::median(&runs.spent).processor_s, runs.figures.errors.mean_deg])
+        .zip(&runs)
+        .map(|(contender, runs)| {
+            [times_touch(contender, runs, touched), runs.figures.errors.mean_deg]
+        })
         .collect();
     let methods = contenders.iter().zip(&runs).zip(pareto_front(&points));
     let methods = methods.map(|((contender, runs), on_front)| MethodReport {
@@ -70,13 +73,23 @@ pub(super) fn of_set(
     })
 }
 
+/// Median time over that of touching: the processor's, or on the wall where a graphics processor takes part.
+fn times_touch(contender: &Contender, runs: &Runs, touched: Spent) -> f64 {
+    let spent = Spent::median(&runs.spent);
+    match contender.adapter {
+        Some(_) => spent.wall_s / touched.wall_s,
+        None => spent.processor_s / touched.processor_s,
+    }
+}
+
 fn method_report(contender: &Contender, runs: &Runs, touched: Spent) -> MethodReport {
     let NormalFigures { mean_deg, median_deg, rms_deg, p95_deg, .. } = runs.figures.errors;
     let spent = Spent::median(&runs.spent);
     MethodReport {
         name: contender.name.to_owned(),
         about: contender.about.to_owned(),
-        times_touch: spent.processor_s / touched.processor_s,
+        times_touch: times_touch(contender, runs, touched),
+        adapter: contender.adapter.clone(),
         milliseconds: 1e3 * spent.wall_s,
         processor_milliseconds: 1e3 * spent.processor_s,
         repeats: runs.spent.len(),

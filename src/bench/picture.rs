@@ -41,7 +41,7 @@ fn of_set(set: &SetReport) -> Panel {
 
 fn is_own(name: &str) -> bool {
     let own = [Method::LeastSquares, Method::Weighted, Method::Auto, Method::Robust];
-    own.into_iter().any(|method| method_name(method) == name)
+    name == "gpu" || own.into_iter().any(|method| method_name(method) == name)
 }
 
 /// The front's points by ascending time.

@@ -60,8 +60,11 @@ pub struct MethodReport {
     pub name: String,
     /// What it does.
     pub about: String,
-    /// Median processor time over that of touching the bytes once.
+    /// Median processor time over that of touching the bytes once; on the wall, both, where a graphics processor takes part.
     pub times_touch: f64,
+    /// The graphics processor that takes part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
     /// Median time of a whole frame; of slow methods, extrapolated from the rows solved.
     pub milliseconds: f64,
     /// Median processor time, all threads together.

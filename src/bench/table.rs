@@ -28,6 +28,9 @@ fn set_text(set: &SetReport, threads: usize) -> String {
         "method", "x touch", "ms", "mean", "median", "rms", "95 %", "unsolved", "robust"
     );
     set.methods.iter().for_each(|method| text.push_str(&method_text(method)));
+    for (method, adapter) in set.methods.iter().filter_map(|m| Some((m, m.adapter.as_ref()?))) {
+        let _ = writeln!(text, "  {}: on {adapter}, multiples of wall time", method.name);
+    }
     text
 }
 
@@ -81,6 +84,7 @@ mod tests {
             name: name.to_owned(),
             about: String::new(),
             times_touch: 4.56,
+            adapter: (name == "gpu").then(|| "card".to_owned()),
             milliseconds: 123.45,
             processor_milliseconds: 200.0,
             repeats: 3,
@@ -104,7 +108,11 @@ mod tests {
             rows_step: 1,
             compared: 5,
             touch: Touch { bytes: 12_300_000, milliseconds: 1.5, processor_milliseconds: 3.0 },
-            methods: vec![method("auto", true, Some(0.25)), method("l1", false, None)],
+            methods: vec![
+                method("auto", true, Some(0.25)),
+                method("gpu", true, Some(0.25)),
+                method("l1", false, None),
+            ],
             warnings: vec![],
         };
         let report = Report {
@@ -119,7 +127,9 @@ linen: plain weave
 640 x 480, 10 lights, 2 threads; touching 12.3 MB once takes 1.50 ms; errors over 5 photosites
   method                 x touch         ms    mean  median     rms    95 %  unsolved   robust
 * auto                       4.6      123.5    1.23    0.50    2.00   12.30    0.10 %   25.0 %
+* gpu                        4.6      123.5    1.23    0.50    2.00   12.30    0.10 %   25.0 %
   l1                         4.6      123.5    1.23    0.50    2.00   12.30    0.10 %        -
+  gpu: on card, multiples of wall time
 ";
         assert_eq!(sets_text(&report), expected);
         assert_eq!(curves_text(&[]), "");

@@ -5,7 +5,7 @@ use super::progress::Progress;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{self, Grid, NormalY, Options, Shown};
+use crate::solve::{self, Device, Grid, NormalY, Options, Shown};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -38,6 +38,9 @@ pub(super) struct Args {
     /// Picture that is not black where to solve, instead of the capture session's own
     #[arg(long, value_name = "M.png")]
     mask: Option<PathBuf>,
+    /// Who solves photosites that have all their samples
+    #[arg(long, default_value = "auto")]
+    device: DeviceName,
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -51,6 +54,34 @@ pub(super) enum MethodName {
     LeastSquares,
     /// Weighted; shadows and highlights looked for at every photosite
     Robust,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DeviceName {
+    /// Whichever was measured to be faster here, transfers included
+    Auto,
+    /// The processor
+    Cpu,
+    /// The graphics processor, through Vulkan
+    Gpu,
+}
+
+impl From<DeviceName> for Device {
+    fn from(name: DeviceName) -> Self {
+        match name {
+            DeviceName::Auto => Self::Auto { memory: device_memory() },
+            DeviceName::Cpu => Self::Cpu,
+            DeviceName::Gpu => Self::Gpu,
+        }
+    }
+}
+
+/// The file among the user's cached ones that remembers what was measured.
+fn device_memory() -> Option<PathBuf> {
+    let given = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
+    let of_user = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache"));
+    let folder = given.filter(|path| path.is_absolute()).or_else(of_user)?;
+    Some(folder.join("weavelight").join("device.json"))
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -81,6 +112,7 @@ impl Args {
             NormalYName::Down => NormalY::Down,
         };
         options.mask.clone_from(&self.mask);
+        options.device = self.device.into();
         options.threads = self.threads.map(usize::from);
         options
     }
@@ -113,13 +145,15 @@ fn text(report: &Report) -> String {
     let scale =
         report.mm_per_px.map_or_else(String::new, |scale| format!(", {scale:.4} mm per pixel"));
     let seconds: f64 = report.seconds.values().sum();
+    let adapter = report.device.as_ref().and_then(|device| device.adapter.as_deref());
+    let with = adapter.map_or_else(String::new, |name| format!(" with {name}"));
     let defective = match report.defective_pixels {
         0 => String::new(),
         count => format!(", {count} defective photosites left out"),
     };
     format!(
         "{:.1} % of {} photosites solved from {} lights{scale}\n\
-         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, albedo in {}, {seconds:.1} s",
+         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, albedo in {}, {seconds:.1} s{with}",
         percent(report.solved),
         report.pixels,
         report.lights_used.len(),

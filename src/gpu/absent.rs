@@ -4,6 +4,7 @@ use super::{Adapter, Answer, GpuError, Tile};
 use std::marker::PhantomData;
 
 /// An opened graphics processor: there is none.
+#[derive(Debug)]
 pub enum Gpu {}
 
 /// A tile under way.
@@ -38,6 +39,11 @@ impl Gpu {
 }
 
 impl Flight<'_> {
+    /// Bytes sent to the device, and to be brought back.
+    pub fn bytes(&self) -> [u64; 2] {
+        match self.0 {}
+    }
+
     /// Waits for the answer.
     ///
     /// # Errors

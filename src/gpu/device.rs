@@ -116,6 +116,12 @@ impl Gpu {
     }
 }
 
+impl std::fmt::Debug for Gpu {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Gpu").field(&self.adapter).finish()
+    }
+}
+
 fn note(complaint: &Mutex<Option<String>>, text: &str) {
     complaint.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| one_line(text));
 }

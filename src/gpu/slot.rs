@@ -146,6 +146,12 @@ impl Buffers {
 }
 
 impl Flight<'_> {
+    /// Bytes sent to the device, and to be brought back.
+    pub fn bytes(&self) -> [u64; 2] {
+        let up: usize = self.packed.regions().iter().map(ExactSizeIterator::len).sum();
+        [up as u64, self.packed.found_bytes() as u64]
+    }
+
     /// Waits for the answer and hands it to `read`.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 mod report;
 
-pub use report::{PlaneReport, Report};
+pub use report::{DeviceReport, PlaneReport, Report};
 
 use crate::files::{FileError, OutputKind};
 use std::path::{Path, PathBuf};

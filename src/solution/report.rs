@@ -49,9 +49,56 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// The capture session's manifest and the calibration's files, with their hashes.
     pub inputs: Vec<Input>,
+    /// Who solved the photosites that have all their samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<DeviceReport>,
     /// Hash of inputs and settings together: the same key means the same solution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub key: Option<String>,
+}
+
+/// Who solved, in `report.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceReport {
+    /// "cpu" or "gpu".
+    pub kind: String,
+    /// Why this one.
+    pub why: String,
+    /// The graphics processor's name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub adapter: Option<String>,
+    /// Its driver.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub driver: Option<String>,
+    /// Whether it is a program that plays a graphics processor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub software: Option<bool>,
+    /// Megabytes sent to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sent_mb: Option<f64>,
+    /// Megabytes brought back.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub received_mb: Option<f64>,
+    /// Time that threads of the processor stood waiting for it, all together. The time of the whole solve is among the
+    /// report's `seconds`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub waited_s: Option<f64>,
+}
+
+impl DeviceReport {
+    /// The processor alone.
+    pub fn processor(why: String) -> Self {
+        Self {
+            kind: "cpu".to_owned(),
+            why,
+            adapter: None,
+            driver: None,
+            software: None,
+            sent_mb: None,
+            received_mb: None,
+            waited_s: None,
+        }
+    }
 }
 
 /// A plane in `report.json`.
@@ -136,6 +183,7 @@ mod tests {
             color_space: "linear sRGB".into(),
             warnings: vec!["light 1 has no frame".into()],
             inputs: vec![Input { name: "session.toml".into(), sha256: "ab".into() }],
+            device: Some(DeviceReport::processor("asked for".into())),
             key: None,
         }
     }

@@ -4,9 +4,12 @@
 use super::field::{FieldRows, LightField};
 use super::maps::{Albedo, Counts, Maps};
 use super::noise::{AmbientNoise, LinearNoise, exposure_variances, merged_variance};
+use super::on_gpu::{OnGpu, TileRows};
 use super::scene::Scene;
 use super::signal::{Normalizer, SignalRows};
-use crate::photometry::{FieldRow, Method, Outcome, RowInput, RowOutput, RowSolver, VarianceModel};
+use crate::photometry::{
+    FieldRow, Method, Outcome, RowError, RowInput, RowOutput, RowSolver, VarianceModel,
+};
 use crate::raw::Layout;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -14,13 +17,15 @@ use weavelight_calibration::description::Image;
 
 /// Rows of a band: several rows of light-field nodes each, and enough bands for many threads.
 const BAND_ROWS: usize = 64;
+/// The same where a graphics processor takes part: several tiles.
+const BAND_ROWS_ON_GPU: usize = 128;
 
 /// A scene with everything that its rows share.
 pub(crate) struct Run<'a> {
     pub(super) scene: &'a Scene,
     pub(super) field: &'a LightField<'a>,
     pub(super) normalizer: Normalizer<'a>,
-    method: Method,
+    pub(super) method: Method,
     /// Per light and exposure: share in the mean, and variance per place of the 2 x 2 cell.
     weights: Vec<Vec<f64>>,
     exposure_variance: Vec<Vec<[VarianceModel; 4]>>,
@@ -31,22 +36,32 @@ pub(crate) struct Run<'a> {
 }
 
 /// Mutable parts of the maps that one band owns.
-struct Band<'m> {
-    first_row: usize,
+pub(super) struct Band<'m> {
+    pub(super) first_row: usize,
     normal: &'m mut [[f32; 3]],
     albedo: &'m mut [f32],
     rgb: &'m mut [[f32; 3]],
     expected_error_deg: &'m mut [f32],
-    outcome: &'m mut [Outcome],
+    pub(super) outcome: &'m mut [Outcome],
 }
 
 /// What a thread keeps from row to row.
 #[derive(Default)]
-struct Worker {
+pub(super) struct Worker {
     rows: SignalRows,
     solver: RowSolver,
     residual: Vec<f32>,
     kept: Vec<u64>,
+    /// The tile under way, and the one being prepared.
+    pub(super) tiles: [TileRows; 2],
+}
+
+/// A row as the kernels want it.
+pub(super) struct ReadRow<'r> {
+    pub(super) y: usize,
+    pub(super) columns: Range<usize>,
+    pub(super) rows: &'r mut SignalRows,
+    pub(super) field: FieldRow<'r>,
 }
 
 impl<'a> Run<'a> {
@@ -80,19 +95,51 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Solves the whole picture on the current thread pool. `done` is told of every finished row.
-    pub(crate) fn solve(&self, done: &(dyn Fn(usize) + Sync)) -> Maps {
-        let (width, height) = (self.scene.width, self.scene.height);
+    /// The kernel's method.
+    pub(crate) fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Lights that were photographed.
+    pub(super) fn lights(&self) -> usize {
+        self.scene.lights.len()
+    }
+
+    /// Photosites inside the mask.
+    pub(super) fn photosites(&self) -> usize {
+        let all = self.scene.width * self.scene.height;
+        let inside = |mask: &Image<bool>| mask.data.iter().filter(|&&inside| inside).count();
+        self.scene.mask.as_ref().map_or(all, inside)
+    }
+
+    /// From the first to the last row inside the mask.
+    pub(super) fn rows_inside(&self) -> Range<usize> {
+        let inside = |y: &usize| self.columns_inside(*y).is_some();
+        let first = (0..self.scene.height).find(inside).unwrap_or(0);
+        let last = (0..self.scene.height).rfind(inside).unwrap_or(0);
+        first..last + 1
+    }
+
+    /// Solves rows on the current thread pool, their complete neighbours on a graphics processor where there is one. `done`
+    /// is told of every finished row.
+    pub(crate) fn solve_rows(
+        &self,
+        rows: Range<usize>,
+        on: Option<&OnGpu>,
+        done: &(dyn Fn(usize) + Sync),
+    ) -> Maps {
+        let (width, height) = (self.scene.width, rows.len());
+        let band_rows = if on.is_some() { BAND_ROWS_ON_GPU } else { BAND_ROWS };
         let mut normal = Image::filled(width, height, [0.0_f32; 3]);
         let mut expected_error_deg = Image::filled(width, height, 0.0_f32);
         let mut outcome = Image::filled(width, height, Outcome::Masked);
         let colour = self.scene.layout == Layout::Rgb;
         let mut rgb = Image::filled(if colour { width } else { 0 }, height, [0.0_f32; 3]);
         let mut albedo = Image::filled(width, height, 0.0_f32);
-        let pixels = width * BAND_ROWS;
+        let pixels = width * band_rows;
         // A picture without colour has bands of no pixels there.
         let mut rgb_bands: Vec<&mut [[f32; 3]]> = rgb.data.chunks_mut(pixels).collect();
-        rgb_bands.resize_with(height.div_ceil(BAND_ROWS), || &mut []);
+        rgb_bands.resize_with(height.div_ceil(band_rows), || &mut []);
         let bands = normal
             .data
             .par_chunks_mut(pixels)
@@ -102,7 +149,7 @@ impl<'a> Run<'a> {
             .zip(rgb_bands)
             .enumerate()
             .map(|(index, ((((normal, albedo), expected_error_deg), outcome), rgb))| Band {
-                first_row: index * BAND_ROWS,
+                first_row: rows.start + index * band_rows,
                 normal,
                 albedo,
                 rgb,
@@ -110,7 +157,12 @@ impl<'a> Run<'a> {
                 outcome,
             });
         let parts: Vec<Counts> = bands
-            .map_init(Worker::default, |worker, band| self.solve_band(worker, band, done))
+            .map_init(Worker::default, |worker, mut band| match on {
+                Some(on) if on.serves(self.method) => {
+                    self.solve_band_on(on, worker, &mut band, done)
+                }
+                _ => self.solve_band(worker, &mut band, done),
+            })
             .collect();
         let mut counts = Counts::default();
         parts.iter().for_each(|part| counts.add(part));
@@ -125,28 +177,33 @@ impl<'a> Run<'a> {
     fn solve_band(
         &self,
         worker: &mut Worker,
-        mut band: Band,
+        band: &mut Band,
         done: &(dyn Fn(usize) + Sync),
     ) -> Counts {
         let width = self.scene.width;
         let mut field = FieldRows::new(self.field);
         let mut counts = Counts::default();
-        for row in 0..band.outcome.len() / width {
-            let y = band.first_row + row;
+        let mut rows = std::mem::take(&mut worker.rows);
+        for y in band.first_row..band.first_row + band.outcome.len() / width {
             if let Some(columns) = self.columns_inside(y) {
+                self.read_row(y, columns.clone(), &mut rows);
                 let field = field.row(y, columns.start);
-                self.solve_row(worker, &mut band, y, columns, field, &mut counts);
+                let read = ReadRow { y, columns, rows: &mut rows, field };
+                self.write_row(worker, band, read, &mut counts, |solver, input, output| {
+                    solver.solve(input, output, self.method)
+                });
             } else {
                 counts.outcomes[Outcome::Masked as usize] += width;
             }
             done(1);
         }
+        worker.rows = rows;
         counts
     }
 
     /// The columns from the first to the last inside the mask, begun where a node of the light field stands at an even
     /// column; `None` where the whole row is outside.
-    fn columns_inside(&self, y: usize) -> Option<Range<usize>> {
+    pub(super) fn columns_inside(&self, y: usize) -> Option<Range<usize>> {
         let Some(mask) = &self.scene.mask else { return Some(0..self.scene.width) };
         let row = mask.row(y);
         let (first, last) =
@@ -155,21 +212,29 @@ impl<'a> Run<'a> {
         Some(first / align * align..last + 1)
     }
 
-    fn solve_row(
+    /// Normalises the columns of a row; unusable outside the mask.
+    pub(super) fn read_row(&self, y: usize, columns: Range<usize>, rows: &mut SignalRows) {
+        self.normalizer.row(y, columns.clone(), rows);
+        if let Some(inside) = self.inside(y, &columns) {
+            rows.blank(inside);
+        }
+    }
+
+    fn inside(&self, y: usize, columns: &Range<usize>) -> Option<&[bool]> {
+        self.scene.mask.as_ref().map(|mask| &mask.row(y)[columns.clone()])
+    }
+
+    /// Solves a row by `kernel` and writes it to the maps.
+    pub(super) fn write_row(
         &self,
         worker: &mut Worker,
         band: &mut Band,
-        y: usize,
-        columns: Range<usize>,
-        field: FieldRow,
+        ReadRow { y, columns, rows, field }: ReadRow,
         counts: &mut Counts,
+        kernel: impl FnOnce(&mut RowSolver, &RowInput, &mut RowOutput) -> Result<(), RowError>,
     ) {
-        let Worker { rows, solver, residual, kept } = worker;
-        self.normalizer.row(y, columns.clone(), rows);
-        let inside = self.scene.mask.as_ref().map(|mask| &mask.row(y)[columns.clone()]);
-        if let Some(inside) = inside {
-            rows.blank(inside);
-        }
+        let Worker { solver, residual, kept, .. } = worker;
+        let inside = self.inside(y, &columns);
         residual.resize(columns.len(), 0.0);
         kept.resize(columns.len(), 0);
         let at = (y - band.first_row) * self.scene.width;
@@ -183,11 +248,10 @@ impl<'a> Run<'a> {
             kept: (self.scene.layout == Layout::Rgb).then_some(kept.as_mut_slice()),
         };
         let signal: Vec<&[f32]> = rows.signals().iter().map(Vec::as_slice).collect();
-        let noise_scale = (!rows.noise_scale.is_empty()).then_some(rows.noise_scale.as_slice());
-        let input =
-            RowInput { signal: &signal, field, variance: &self.variance[y & 1], noise_scale };
+        let (variance, noise_scale) = (&self.variance[y & 1], rows.noise_scale());
+        let input = RowInput { signal: &signal, field, variance, noise_scale };
         // The slices are cut to fit above; were they not, the row would stay unsolved and say so.
-        if solver.solve(&input, &mut output, self.method).is_err() {
+        if kernel(solver, &input, &mut output).is_err() {
             output.outcome.fill(Outcome::TooFewLights);
         }
         if self.several_exposures {
@@ -285,11 +349,6 @@ impl<'a> Run<'a> {
     /// Where the lights are.
     pub(crate) fn field(&self) -> &LightField<'a> {
         self.field
-    }
-
-    /// The kernel's method.
-    pub(crate) fn method(&self) -> Method {
-        self.method
     }
 
     /// Share of an exposure in the mean of its light.

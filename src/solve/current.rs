@@ -1,6 +1,6 @@
 //! What is up to date is not made again: a solution remembers the hash of everything it was made from.
 
-use super::{Options, SolveError};
+use super::{Device, Options, SolveError};
 use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE};
 use crate::session::Session;
@@ -28,6 +28,10 @@ pub(crate) fn key(
 ) -> Result<String, SolveError> {
     let mut text =
         format!("{PROGRAM} {:?} {:?} {:?}", options.method, options.grid, options.normal_y);
+    // Who solves without being named must not matter; one that is asked for by name is to be asked.
+    if matches!(options.device, Device::Gpu) {
+        text.push_str(" gpu");
+    }
     let unhashed = session.frames.iter().filter(|frame| frame.sha256.is_none());
     let mut files = vec![session.manifest_path()];
     files.extend(unhashed.map(|frame| session.frame_path(frame)));

@@ -1,4 +1,5 @@
 use crate::files::FileError;
+use crate::gpu::GpuError;
 use crate::raw::ReadError;
 use crate::session::SessionError;
 use std::path::PathBuf;
@@ -15,6 +16,9 @@ pub enum SolveError {
     /// A frame that does not decode, or a mask.
     #[error(transparent)]
     Frame(#[from] ReadError),
+    /// A graphics processor that was asked for.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// A capture session of boards.
     #[error("{}: its frames are pictures of a chessboard, there is nothing to solve; use it with `weavelight calibrate camera`", .session.display())]
     Board {

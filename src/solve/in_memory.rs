@@ -3,15 +3,18 @@
 use super::SolveError;
 use super::bands::Run;
 use super::check::{check_frames, check_light_field};
+use super::device::{Chosen, Device, choose};
 use super::estimate::noise_of_residuals;
 use super::field::{LightField, Unseen};
 use super::maps::Maps;
 use super::noise::{LinearNoise, full_scale};
+use super::on_gpu::{OnGpu, report_of};
 use super::progress::{Progress, Stage};
 use super::scene::Scene;
 use super::witness::question;
 use crate::instrument::{CAMERA_FILE, Noise};
 use crate::photometry::Method;
+use crate::solution::DeviceReport;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Noise that is assumed where neither the calibration nor the residuals tell: a full well of 40 000 electrons in
@@ -19,6 +22,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const TYPICAL_FULL_WELL_E: f64 = 40_000.0;
 const TYPICAL_READ_NOISE_E: f64 = 4.0;
 const TYPICAL_KAPPA: f64 = 0.005;
+
+/// What came of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolvedScene {
+    /// The maps.
+    pub maps: Maps,
+    /// Sentences.
+    pub warnings: Vec<String>,
+    /// Who solved.
+    pub device: DeviceReport,
+}
 
 /// Solves a scene on the current thread pool: maps and warnings.
 ///
@@ -29,17 +43,38 @@ pub fn solve_scene(
     method: Method,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<(Maps, Vec<String>), SolveError> {
+    let solved = solve_scene_on(scene, method, &Device::Cpu, progress)?;
+    Ok((solved.maps, solved.warnings))
+}
+
+/// Solves a scene on the current thread pool, with the help of a graphics processor where `device` says so.
+///
+/// # Errors
+/// As [`solve_scene`]; and where a graphics processor is asked for and there is none.
+pub fn solve_scene_on(
+    scene: &Scene,
+    method: Method,
+    device: &Device,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<SolvedScene, SolveError> {
     check_frames(scene)?;
     let field = light_field(scene)?;
-    let warnings = check_light_field(scene, &field)?;
+    let mut warnings = check_light_field(scene, &field)?;
     let run = Run::new(scene, &field, noise(scene, &field), method);
+    let Chosen { gpu, why } = choose(&run, device)?;
+    if gpu.is_none() && matches!(device, Device::Gpu | Device::Opened(_)) {
+        warnings.push(format!("No graphics processor took part: {why}."));
+    }
+    let on = gpu.as_deref().map(OnGpu::new);
     let rows = AtomicUsize::new(0);
     let total = scene.height;
-    let maps = run.solve(&|finished| {
+    let maps = run.solve_rows(0..total, on.as_ref(), &|finished| {
         let done = rows.fetch_add(finished, Ordering::Relaxed) + finished;
         progress(Progress { stage: Stage::Solve, done, total });
     });
-    Ok((maps, warnings))
+    let (device, failure) = report_of(why, on.as_ref());
+    warnings.extend(failure);
+    Ok(SolvedScene { maps, warnings, device })
 }
 
 /// Leaves out lights that add nothing; warnings about these and about lights that contradict the others.

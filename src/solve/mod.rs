@@ -6,6 +6,8 @@
 mod bands;
 mod check;
 mod current;
+mod device;
+mod device_memory;
 mod drift;
 mod encode;
 mod error;
@@ -18,6 +20,7 @@ mod in_memory;
 mod load;
 mod maps;
 mod noise;
+mod on_gpu;
 mod options;
 pub mod preview;
 mod progress;
@@ -32,9 +35,10 @@ mod signal;
 mod tests;
 mod witness;
 
+pub use device::Device;
 pub use error::SolveError;
 pub use finish::Finished;
-pub use in_memory::{leave_out_dark_lights, solve_scene};
+pub use in_memory::{SolvedScene, leave_out_dark_lights, solve_scene, solve_scene_on};
 pub use load::load_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 pub use options::{Grid, NormalY, Options, Reuse};

@@ -1,3 +1,4 @@
+use super::Device;
 use crate::photometry::Method;
 use std::path::PathBuf;
 
@@ -20,6 +21,8 @@ pub struct Options {
     pub mask: Option<PathBuf>,
     /// Threads; `None`: one per core. The result does not depend on it.
     pub threads: Option<usize>,
+    /// Who solves photosites that have all their samples.
+    pub device: Device,
     /// Whether a solution that is up to date is made again.
     pub reuse: Reuse,
 }
@@ -55,7 +58,7 @@ pub enum NormalY {
 }
 
 impl Options {
-    /// The default way: method auto, the sensor's grid, +y up, the capture session's mask, all cores.
+    /// The default way: method auto, the sensor's grid, +y up, the capture session's mask, all cores, no graphics processor.
     pub fn new(
         session: impl Into<PathBuf>,
         calibration: impl Into<PathBuf>,
@@ -70,6 +73,7 @@ impl Options {
             normal_y: NormalY::Up,
             mask: None,
             threads: None,
+            device: Device::Cpu,
             reuse: Reuse::IfCurrent,
         }
     }

@@ -76,7 +76,7 @@ impl Rows<'_> {
             signal: &signal,
             field: field.row(y, 0),
             variance: &self.0.variance[y & 1],
-            noise_scale: (!rows.noise_scale.is_empty()).then_some(&rows.noise_scale),
+            noise_scale: rows.noise_scale(),
         };
         let mut output =
             RowOutput { normal, albedo, expected_error_deg, residual, outcome, kept: None };

@@ -43,7 +43,7 @@ pub(crate) struct SignalRows {
     /// Colour pictures only, per light: grey value of the planes.
     grey: Vec<Vec<f32>>,
     /// Per photosite: 1 / mean gain; empty where no light has a gain map.
-    pub(crate) noise_scale: Vec<f32>,
+    noise_scale: Vec<f32>,
     /// Per photosite: at least one sample clipped.
     pub(crate) saturated: Vec<bool>,
     /// Per light with several exposures: bit e set where exposure e counts. Empty for the others.
@@ -302,6 +302,11 @@ impl SignalRows {
     /// What the kernels fit: one row a light.
     pub(crate) fn signals(&self) -> &[Vec<f32>] {
         if self.grey.is_empty() { &self.planes } else { &self.grey }
+    }
+
+    /// Per photosite: 1 / mean gain, where any light has a gain map.
+    pub(crate) fn noise_scale(&self) -> Option<&[f32]> {
+        (!self.noise_scale.is_empty()).then_some(&self.noise_scale)
     }
 
     /// Makes photosites outside the mask unusable.

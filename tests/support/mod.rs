@@ -68,8 +68,14 @@ impl Home {
 
     /// Runs the program in this folder.
     pub fn run(&self, call: &str) -> Said {
+        self.run_with(call, &[])
+    }
+
+    /// Runs the program in this folder, with these environment variables.
+    pub fn run_with(&self, call: &str, variables: &[(&str, &str)]) -> Said {
         let mut command = Command::cargo_bin("weavelight").unwrap();
         command.current_dir(self.folder.path()).args(call.split_whitespace());
+        command.envs(variables.iter().copied());
         let output = command.output().unwrap();
         Said {
             status: output.status.code(),

@@ -12,9 +12,11 @@ mod svd;
 #[cfg(test)]
 mod tests;
 
+use crate::gpu::Gpu;
 use crate::photometry::{Method, reference_row};
-use crate::solve::{Maps, Rows, SolveError, method_name, solve_scene};
+use crate::solve::{Device, Rows, SolveError, method_name, solve_scene_on};
 use photosite::{Estimator, solve_row};
+use std::sync::Arc;
 use weavelight_calibration::description::Image;
 
 /// A way to solve a scene.
@@ -25,6 +27,8 @@ pub struct Contender {
     pub about: &'static str,
     /// Whole frames, or rows only.
     pub pace: Pace,
+    /// The graphics processor that takes part. The processor's time says nothing then: time on the wall counts.
+    pub adapter: Option<String>,
     /// From rows and step to what came out; a contender at the pace of frames ignores the step.
     pub solve: Solve,
 }
@@ -49,9 +53,9 @@ pub struct Answer {
     pub robust_share: Option<f64>,
 }
 
-/// Everybody, in the order of the tables.
-pub fn all() -> Vec<Contender> {
-    vec![
+/// Everybody, in the order of the tables; with a graphics processor, where there is one.
+pub fn all(gpu: Option<Gpu>) -> Vec<Contender> {
+    let mut all = vec![
         of_literature(
             "svd-x4",
             "SVD per photosite, four solves: the published way",
@@ -62,6 +66,9 @@ pub fn all() -> Vec<Contender> {
         own(Method::Weighted, "weighted by the noise"),
         own(Method::Auto, "weighted, subset test where the residual asks for it"),
         own(Method::Robust, "weighted, subset test everywhere"),
+    ];
+    all.extend(gpu.map(on_gpu));
+    all.extend([
         of_literature("l1", "least sum of absolute residuals", l1::least_absolute),
         of_literature("cauchy", "Cauchy's weights, ten times", cauchy::cauchy),
         of_literature(
@@ -74,17 +81,36 @@ pub fn all() -> Vec<Contender> {
             "sparse errors, 60 iterations",
             sparse_bayesian::sparse_bayesian,
         ),
-    ]
+    ]);
+    all
 }
 
 fn own(method: Method, about: &'static str) -> Contender {
+    own_on(Device::Cpu, method, about)
+}
+
+/// The automatic way, complete neighbours on a graphics processor.
+fn on_gpu(gpu: Gpu) -> Contender {
+    let adapter = Some(gpu.adapter().name.clone());
+    let device = Device::Opened(Arc::new(gpu));
+    let about = "auto, complete neighbours on the graphics processor, transfers included";
+    Contender { name: "gpu", adapter, ..own_on(device, Method::Auto, about) }
+}
+
+fn own_on(device: Device, method: Method, about: &'static str) -> Contender {
     let solve = move |rows: &Rows, _: usize| -> Result<Answer, SolveError> {
-        let (Maps { normal, counts, .. }, _) = solve_scene(rows.scene(), method, &|_| {})?;
-        let share = counts.robust() as f64 / counts.solved().max(1) as f64;
+        let maps = solve_scene_on(rows.scene(), method, &device, &|_| {})?.maps;
+        let share = maps.counts.robust() as f64 / maps.counts.solved().max(1) as f64;
         let robust_share = matches!(method, Method::Auto | Method::Robust).then_some(share);
-        Ok(Answer { normal, robust_share })
+        Ok(Answer { normal: maps.normal, robust_share })
     };
-    Contender { name: method_name(method), about, pace: Pace::Frames, solve: Box::new(solve) }
+    Contender {
+        name: method_name(method),
+        about,
+        pace: Pace::Frames,
+        adapter: None,
+        solve: Box::new(solve),
+    }
 }
 
 fn normal_equations() -> Contender {
@@ -98,6 +124,7 @@ fn normal_equations() -> Contender {
         name: "normal-equations",
         about: "per photosite in float64",
         pace: Pace::Rows,
+        adapter: None,
         solve: Box::new(solve),
     }
 }
@@ -107,5 +134,5 @@ fn of_literature(name: &'static str, about: &'static str, estimator: Estimator) 
         let normal = rows.solve(step, &|input, output| solve_row(estimator, input, output));
         Ok(Answer { normal, robust_share: None })
     };
-    Contender { name, about, pace: Pace::Rows, solve: Box::new(solve) }
+    Contender { name, about, pace: Pace::Rows, adapter: None, solve: Box::new(solve) }
 }

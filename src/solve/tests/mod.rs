@@ -1,4 +1,6 @@
 mod folders;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod previews;
 mod scenes;
 

@@ -1,0 +1,137 @@
+//! Who solves complete neighbours: the processor, or a graphics processor where that is asked for or measured to be faster.
+
+use super::SolveError;
+use super::bands::Run;
+use super::device_memory::{Measured, Memory};
+use super::on_gpu::OnGpu;
+use crate::gpu::Gpu;
+use crate::photometry::Method;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Who solves the photosites that have all their samples. All answers agree within 0.001 degrees.
+#[derive(Clone, Debug, Default)]
+pub enum Device {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// The graphics processor, or an error.
+    Gpu,
+    /// This graphics processor.
+    Opened(Arc<Gpu>),
+    /// Whichever was measured to be faster on this machine; the processor where nothing can be measured.
+    Auto {
+        /// The file that remembers what was measured; `None`: measured every time.
+        memory: Option<PathBuf>,
+    },
+}
+
+/// Who it came to be.
+pub(crate) struct Chosen {
+    pub(crate) gpu: Option<Arc<Gpu>>,
+    pub(crate) why: String,
+}
+
+/// Samples of a picture that the processor solves before a graphics processor is found: two megapixels under ten lights.
+const WORTH_ASKING: usize = 20_000_000;
+/// Rows to measure with, a thread.
+const MEASURED_ROWS: usize = 128;
+/// Measurements of each, the shortest counts.
+const MEASUREMENTS: usize = 2;
+
+impl Chosen {
+    fn processor(why: impl Into<String>) -> Self {
+        Self { gpu: None, why: why.into() }
+    }
+}
+
+/// Decides on the current thread pool.
+///
+/// # Errors
+/// Where a graphics processor is asked for and there is none.
+pub(crate) fn choose(run: &Run, device: &Device) -> Result<Chosen, SolveError> {
+    if run.method() == Method::Robust {
+        return Ok(Chosen::processor("the subset test of every photosite is the processor's"));
+    }
+    let asked = "asked for";
+    Ok(match device {
+        Device::Cpu => Chosen::processor(asked),
+        Device::Gpu => Chosen { gpu: Some(Arc::new(Gpu::open()?)), why: asked.to_owned() },
+        Device::Opened(gpu) => Chosen { gpu: Some(gpu.clone()), why: asked.to_owned() },
+        Device::Auto { memory } => {
+            let samples = run.photosites() * run.lights();
+            if samples < WORTH_ASKING {
+                Chosen::processor("the picture is too small to look for a graphics processor")
+            } else {
+                faster(run, memory.as_deref())
+            }
+        }
+    })
+}
+
+/// The faster of the two, as remembered, else as measured now.
+pub(super) fn faster(run: &Run, memory: Option<&Path>) -> Chosen {
+    let mut known = memory.map_or_else(Memory::default, Memory::read);
+    let kind = kind_of(run);
+    let remembered = known.of(&kind).cloned();
+    if let Some(measured) = remembered.as_ref().filter(|measured| !measured.gpu_is_faster()) {
+        return Chosen::processor(format!("remembered: {}", measured.text()));
+    }
+    let gpu = match Gpu::open() {
+        Ok(gpu) => Arc::new(gpu),
+        Err(error) => return Chosen::processor(error.to_string()),
+    };
+    if let Some(measured) = remembered.filter(|measured| measured.adapter == *gpu.adapter()) {
+        return Chosen { gpu: Some(gpu), why: format!("remembered: {}", measured.text()) };
+    }
+    let [processor_ns, gpu_ns] = match measure(run, &gpu) {
+        Ok(measured) => measured,
+        Err(why) => return Chosen::processor(why),
+    };
+    let measured = Measured { kind, adapter: gpu.adapter().clone(), processor_ns, gpu_ns };
+    let chosen = measured.gpu_is_faster().then_some(gpu);
+    let why = format!("measured: {}", measured.text());
+    known.remember(measured);
+    if let Some(path) = memory {
+        known.write(path);
+    }
+    Chosen { gpu: chosen, why }
+}
+
+/// What a measurement holds for, besides the machine.
+fn kind_of(run: &Run) -> String {
+    let threads = rayon::current_num_threads();
+    format!("{:?}, {} lights, {threads} threads", run.method(), run.lights())
+}
+
+/// Nanoseconds a photosite by the processor and by the graphics processor, transfers and what it leaves over included.
+fn measure(run: &Run, gpu: &Gpu) -> Result<[f64; 2], String> {
+    let rows = middle_rows(run);
+    let on = OnGpu::new(gpu);
+    let mut least = [f64::INFINITY; 2];
+    for round in 0..=MEASUREMENTS {
+        for (who, least) in [None, Some(&on)].into_iter().zip(&mut least) {
+            let begun = Instant::now();
+            let maps = run.solve_rows(rows.clone(), who, &|_| {});
+            let photosites = (maps.outcome.width * maps.outcome.height) as f64;
+            // The first round warms up.
+            if round > 0 {
+                *least = least.min(1e9 * begun.elapsed().as_secs_f64() / photosites);
+            }
+        }
+    }
+    match on.failure() {
+        Some(failure) => Err(failure.to_string()),
+        None => Ok(least),
+    }
+}
+
+/// Rows out of the middle of what is to be solved.
+fn middle_rows(run: &Run) -> Range<usize> {
+    let all = run.rows_inside();
+    let count = all.len().min(MEASURED_ROWS * rayon::current_num_threads());
+    let first = all.start + (all.len() - count) / 2;
+    first..first + count
+}
