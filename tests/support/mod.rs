@@ -75,6 +75,8 @@ impl Home {
     pub fn run_with(&self, call: &str, variables: &[(&str, &str)]) -> Said {
         let mut command = Command::cargo_bin("weavelight").unwrap();
         command.current_dir(self.folder.path()).args(call.split_whitespace());
+        // As on every desktop; without it Vulkan's layers complain on standard error.
+        command.env("XDG_RUNTIME_DIR", self.folder.path());
         command.envs(variables.iter().copied());
         let output = command.output().unwrap();
         Said {
