@@ -37,6 +37,7 @@ mod wide;
 pub(crate) mod tests;
 
 pub use elsewhere::{CutPiece, CutRow, Found};
+#[cfg(feature = "gpu")]
 pub(crate) use method::chi_square_limit;
 pub use method::{MAX_LIGHTS, Method};
 pub use noise::estimate_noise;

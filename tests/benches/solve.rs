@@ -16,12 +16,16 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+use weavelight::gpu::Gpu;
 use weavelight::instrument::{CalibratedLight, Color, Noise};
 use weavelight::photometry::{Method, Outcome};
 use weavelight::raw::{Frame, Layout, Metadata, Samples};
 use weavelight::solve::preview::{Accumulator, Scale};
-use weavelight::solve::{Exposure, Origin, PhotographedLight, Scene, solve_scene};
+use weavelight::solve::{
+    Device, Exposure, Origin, PhotographedLight, Scene, solve_scene, solve_scene_on,
+};
 use weavelight_calibration::description::{Camera, Cfa, Image, Light, Plane, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;
 use weavelight_calibration::projection::Projector;
@@ -73,6 +77,7 @@ fn in_memory((width, height): (usize, usize)) {
     ] {
         line(name, median(&mut || drop(solve_scene(&scene, method, &|_| {}).unwrap())));
     }
+    on_gpu(&scene, &line);
     let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
     println!(
         "  auto: {} of {} solved, {} by the robust path",
@@ -98,6 +103,21 @@ fn in_memory((width, height): (usize, usize)) {
         ("1/8", Scale::Eighth),
     ] {
         previews(name, scale, &mut scene, touch);
+    }
+}
+
+/// The same with a graphics processor, transfers included, where there is one.
+fn on_gpu(scene: &Scene, line: &dyn Fn(&str, Duration)) {
+    let gpu = match Gpu::open() {
+        Ok(gpu) => gpu,
+        Err(error) => return println!("  no graphics processor: {error}"),
+    };
+    let adapter = gpu.adapter().name.clone();
+    let device = Device::Opened(Arc::new(gpu));
+    for (name, method) in [("least squares", Method::LeastSquares), ("auto", Method::Auto)] {
+        let solve = || drop(solve_scene_on(scene, method, &device, &|_| {}).unwrap());
+        solve();
+        line(&format!("{name}, on {adapter}"), median(&mut { solve }));
     }
 }
 
