@@ -4,6 +4,7 @@
 //! look at the lights at both moments. It knows nothing of lights and plans.
 
 mod error;
+mod remembered;
 mod simulated;
 pub mod tethered;
 mod usb;

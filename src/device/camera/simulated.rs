@@ -1,5 +1,6 @@
 //! The simulated rig's camera: it looks which lights are lit while its shutter is open and photographs exactly that.
 
+use super::remembered::Remembered;
 use super::{Applied, Camera, CameraError, Description, Release, Settings, Shutter};
 use crate::files::FileError;
 use crate::instrument::Rig;
@@ -34,7 +35,7 @@ pub struct SimulatedCamera {
 /// What stands before the camera.
 struct Before {
     scene: Scene,
-    subject: Box<dyn Subject + Send>,
+    subject: Remembered,
     instrument: Instrument,
     /// Per output of the board: which light hangs on it in truth, if one does and shines.
     light_of_output: Vec<(u32, Option<usize>)>,
@@ -54,7 +55,8 @@ impl Before {
         let light_of_output = (0..rig.lights.len())
             .map(|light| (rig.channel(light), scene.flaws.light_that_shines(light)))
             .collect();
-        Ok(Self { subject: scene.subject(&instrument)?, scene, instrument, light_of_output })
+        let subject = Remembered::new(scene.subject(&instrument)?, &instrument.stage);
+        Ok(Self { subject, scene, instrument, light_of_output })
     }
 }
 
@@ -123,11 +125,10 @@ impl SimulatedCamera {
         // The range ends at fewer electrons: shorter exposures have more noise.
         let sensor = Sensor { full_well_e: sensor.full_well_e / gain, ..sensor.clone() };
         let strengths = self.strengths(open, close);
-        let lights = strengths.iter().map(|&(light, _)| stage.lights[light].clone()).collect();
         let lit = Lit {
-            subject: &*self.before.subject,
-            stage: Stage { lights, ..stage.clone() },
-            strengths: strengths.iter().map(|&(_, strength)| strength as f32).collect(),
+            subject: &self.before.subject,
+            stage,
+            lit: strengths.iter().map(|&(light, strength)| (light, strength as f32)).collect(),
         };
         // One lamp for all that is lit, so that nothing else is rendered.
         let first = stage.lights[..1].to_vec();
@@ -196,25 +197,17 @@ impl Camera for SimulatedCamera {
 
 /// The subject under several lights at once, as one lamp.
 struct Lit<'a> {
-    subject: &'a dyn Subject,
-    stage: Stage,
-    strengths: Vec<f32>,
+    subject: &'a Remembered,
+    stage: &'a Stage,
+    /// Lights of the stage with their strengths.
+    lit: Vec<(usize, f32)>,
 }
 
 impl Subject for Lit<'_> {
     fn expose(&self, _: &Stage, tile: Tile, signals: &mut Signals) {
-        let blank = vec![0.0; tile.pixels()];
-        let mut each = Signals {
-            lights: vec![blank.clone(); self.stage.lights.len()],
-            ambient: blank,
-            truth: None,
-        };
-        self.subject.expose(&self.stage, tile, &mut each);
-        for (light, strength) in each.lights.iter().zip(&self.strengths) {
-            let sum = signals.lights[0].iter_mut().zip(light);
-            sum.for_each(|(sum, light)| *sum += strength * light);
-        }
-        signals.ambient = each.ambient;
+        let (sum, ambient) = self.subject.sum(self.stage, &self.lit, tile);
+        signals.lights[0] = sum;
+        signals.ambient = ambient;
     }
 }
 
