@@ -58,6 +58,8 @@ pub(super) struct Hit {
     pub(super) normal: [f32; 3],
     /// In the photosite's own channel.
     pub(super) albedo: f32,
+    /// Cloth may shine; the table is matt.
+    pub(super) is_cloth: bool,
 }
 
 /// A light as seen from one photosite.
@@ -202,6 +204,9 @@ impl<'a> TileScene<'a> {
         {
             return 0.0;
         }
+        if !hit.is_cloth {
+            return facing * hit.albedo;
+        }
         let directions = Directions { normal: hit.normal, light: beam.towards, view };
         facing * (hit.albedo + self.fabric.cloth.reflectance.gloss(&directions, channel))
     }
@@ -239,6 +244,7 @@ impl<'a> TileScene<'a> {
                 height_mm: surface.height_mm as f32,
                 normal: n,
                 albedo: dot(self.channels[channel], surface.albedo),
+                is_cloth: self.fabric.covers(px, py),
             });
         }
         middle /= hits.len() as f64;

@@ -224,3 +224,22 @@ fn the_exposure_brings_the_brightest_light_to_half() {
     let brightest = high.iter().copied().fold(0.0, f64::max);
     assert!((brightest - 0.5).abs() < 0.03, "{high:?}");
 }
+
+/// A shiny cloth lies on the same matt table as a dull one.
+#[test]
+fn the_table_does_not_shine_with_the_cloth() {
+    let stage = stage(120, 80);
+    let sensor = Sensor::default().without_noise();
+    let photograph = |reflectance: Reflectance| {
+        let extent = Some(Extent { width_mm: 150.0, height_mm: 100.0 });
+        let swatch = Fabric { extent, ..fabric(Cloth { reflectance, ..flat() }) };
+        shoot(&swatch, &stage, &sensor, &shots(), &|_| {})
+    };
+    let dull = photograph(Reflectance::Lambert);
+    let shiny = photograph(Reflectance::Satin { f0: 0.05, alpha: 0.28 });
+    let (corner, middle) = (5 * 120 + 5, 40 * 120 + 60);
+    for (light, (dull, shiny)) in dull.iter().zip(&shiny).enumerate().take(10) {
+        assert_eq!(dull[corner], shiny[corner], "light {light}");
+        assert!(dull[middle] < shiny[middle], "light {light}");
+    }
+}
