@@ -9,6 +9,7 @@ mod demo;
 mod doctor;
 mod gui;
 mod import;
+mod mask;
 mod output;
 mod progress;
 mod scan;
@@ -38,6 +39,7 @@ enum Command {
     Demo(demo::Args),
     Simulate(Box<simulate::Args>),
     Scan(Box<scan::Args>),
+    Mask(mask::Args),
     Solve(solve::Args),
     Import(import::Args),
     Calibrate(calibrate::Args),
@@ -53,6 +55,7 @@ impl Command {
             Command::Demo(args) => demo::run(args),
             Command::Simulate(args) => simulate::run(args),
             Command::Scan(args) => scan::run(args),
+            Command::Mask(args) => mask::run(args),
             Command::Solve(args) => solve::run(args),
             Command::Import(args) => import::run(args),
             Command::Calibrate(args) => calibrate::run(args),

@@ -5,13 +5,16 @@ use super::progress::Progress;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{self, Device, Grid, NormalY, Options, Shown};
+use crate::solve::{
+    self, Device, Grid, MaskChoice, NormalY, Options, Outputs, Reuse, Scale, Shown,
+};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// Turn a capture session into normal, albedo and confidence maps
 ///
-/// An earlier solution at DIR is replaced when the new one is whole.
+/// An earlier solution at DIR is replaced when the new one is whole; one that was made from the same inputs with the same
+/// settings is left as it is.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  weavelight solve linen-4021 --calibration calibration --out linen-4021-maps"
@@ -35,12 +38,22 @@ pub(super) struct Args {
     /// Where green points in normal.png
     #[arg(long, default_value = "up")]
     normal_y: NormalYName,
-    /// Picture that is not black where to solve, instead of the capture session's own
-    #[arg(long, value_name = "M.png")]
+    /// Where to solve: a picture that is not black there, "auto" to leave out the table if it can be told from the swatch, or
+    /// "none" for everywhere [default: the capture session's own mask]
+    #[arg(long, value_name = "M.png|auto|none")]
     mask: Option<PathBuf>,
     /// Who solves photosites that have all their samples
     #[arg(long, default_value = "auto")]
     device: DeviceName,
+    /// Make only these, comma-separated: maps, png for both as pictures, page for report.html [default: all]
+    #[arg(long, value_name = "MAP,...", value_delimiter = ',')]
+    only: Vec<Wanted>,
+    /// A quick look: maps of a fraction of the resolution, one pixel for 8 x 8 (4 x 4, 2 x 2) photosites
+    #[arg(long, value_name = "8|4|2", value_parser = clap::builder::PossibleValuesParser::new(["8", "4", "2"]))]
+    preview: Option<String>,
+    /// Solve again even if nothing has changed
+    #[arg(long)]
+    force: bool,
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -92,6 +105,15 @@ enum NormalYName {
     Down,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Wanted {
+    Normal,
+    Albedo,
+    Confidence,
+    Png,
+    Page,
+}
+
 impl From<MethodName> for Method {
     fn from(name: MethodName) -> Self {
         match name {
@@ -111,10 +133,32 @@ impl Args {
             NormalYName::Up => NormalY::Up,
             NormalYName::Down => NormalY::Down,
         };
-        options.mask.clone_from(&self.mask);
+        options.mask = match &self.mask {
+            None => MaskChoice::OfSession,
+            Some(none) if none.as_os_str() == "none" => MaskChoice::Everything,
+            Some(auto) if auto.as_os_str() == "auto" => MaskChoice::Found,
+            Some(path) => MaskChoice::File(path.clone()),
+        };
+        options.outputs = Outputs {
+            normal: self.wants(Wanted::Normal),
+            albedo: self.wants(Wanted::Albedo),
+            confidence: self.wants(Wanted::Confidence),
+            png: self.wants(Wanted::Png),
+        };
+        options.scale = match self.preview.as_deref() {
+            Some("8") => Scale::Eighth,
+            Some("4") => Scale::Quarter,
+            Some("2") => Scale::Half,
+            _ => Scale::Full,
+        };
+        options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
         options.device = self.device.into();
         options.threads = self.threads.map(usize::from);
         options
+    }
+
+    fn wants(&self, what: Wanted) -> bool {
+        self.only.is_empty() || self.only.contains(&what)
     }
 }
 
@@ -122,18 +166,17 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let progress = Progress::new();
     let tell = |state: solve::Progress| progress.set(state.share(), state.stage.what());
     let page = |shown: &Shown| page_of_solve(shown, None);
-    let solved =
-        solve::run_with_page(&args.options(), &tell, Some(&page)).map_err(Failure::work)?;
+    let page: Option<solve::Page> = args.wants(Wanted::Page).then_some(&page);
+    let solved = solve::run_with_page(&args.options(), &tell, page).map_err(Failure::work)?;
     drop(progress);
     let report = solved.report;
     let up_to_date = if solved.up_to_date { "up to date, " } else { "" };
+    let look = page.map_or_else(String::new, |_| {
+        format!("\n{}  to look at", args.out.join(REPORT_HTML).display())
+    });
+    let swatch = report.swatch.as_ref().map_or_else(String::new, |said| format!("\n{said}"));
     Ok(Output {
-        text: format!(
-            "{}: {up_to_date}{}\n{}  to look at",
-            args.out.display(),
-            text(&report),
-            args.out.join(REPORT_HTML).display()
-        ),
+        text: format!("{}: {up_to_date}{}{swatch}{look}", args.out.display(), text(&report)),
         json: serde_json::to_value(&report).map_err(Failure::work)?,
         warnings: report.warnings,
         status: 0,
@@ -151,8 +194,12 @@ fn text(report: &Report) -> String {
         0 => String::new(),
         count => format!(", {count} defective photosites left out"),
     };
+    let what = match report.scale {
+        1 => "photosites".to_owned(),
+        side => format!("pixels of {side} x {side} photosites"),
+    };
     format!(
-        "{:.1} % of {} photosites solved from {} lights{scale}\n\
+        "{:.1} % of {} {what} solved from {} lights{scale}\n\
          robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, albedo in {}, {seconds:.1} s{with}",
         percent(report.solved),
         report.pixels,

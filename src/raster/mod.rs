@@ -15,5 +15,6 @@ pub use exr_out::{encode_exr, write_exr, write_exr_rgb, write_exr_y};
 pub(crate) use picture::not_a_picture;
 pub use picture::{Format, Picture, Values, decode_picture, read_mask, read_picture};
 pub use png_out::{
-    PngContent, encode_png_rgb8, write_png_grey8, write_png_grey16, write_png_rgb16,
+    PngContent, encode_png_grey8, encode_png_rgb8, write_png_grey8, write_png_grey16,
+    write_png_rgb16,
 };

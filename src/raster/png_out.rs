@@ -61,12 +61,17 @@ pub fn write_png_grey16(
 /// # Errors
 /// No space, or not allowed.
 pub fn write_png_grey8(path: &Path, image: &Image<u8>) -> Result<(), FileError> {
-    let kind = Kind {
-        color: png::ColorType::Grayscale,
-        depth: png::BitDepth::Eight,
-        content: PngContent::Data,
-    };
-    write(path, [image.width, image.height], kind, |y, bytes| bytes.extend(image.row(y)))
+    write(path, [image.width, image.height], GREY8, |y, bytes| bytes.extend(image.row(y)))
+}
+
+/// The bytes of an 8-bit grey PNG.
+///
+/// # Errors
+/// An empty picture.
+pub fn encode_png_grey8(image: &Image<u8>) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    encode(&mut bytes, [image.width, image.height], GREY8, |y, bytes| bytes.extend(image.row(y)))?;
+    Ok(bytes)
 }
 
 /// The bytes of an 8-bit RGB PNG, such as a picture inside a report.
@@ -88,6 +93,12 @@ struct Kind {
     depth: png::BitDepth,
     content: PngContent,
 }
+
+const GREY8: Kind = Kind {
+    color: png::ColorType::Grayscale,
+    depth: png::BitDepth::Eight,
+    content: PngContent::Data,
+};
 
 fn write(
     path: &Path,

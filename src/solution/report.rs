@@ -17,6 +17,9 @@ pub struct Report {
     /// Width and height of the maps.
     #[serde(default)]
     pub size_px: [usize; 2],
+    /// Photosites that a pixel of the maps spans, each way: 1, or more in a preview.
+    #[serde(default = "full_resolution")]
+    pub scale: usize,
     /// Indices, ascending.
     pub lights_used: Vec<usize>,
     /// Photosites of a frame.
@@ -45,6 +48,9 @@ pub struct Report {
     pub plane: PlaneReport,
     /// What the albedo's R, G, B are: "linear sRGB" or "white-balanced camera RGB".
     pub color_space: String,
+    /// What was found of the swatch, where the solve was to find it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swatch: Option<String>,
     /// Sentences; the same go to standard error.
     pub warnings: Vec<String>,
     /// The capture session's manifest and the calibration's files, with their hashes.
@@ -99,6 +105,10 @@ impl DeviceReport {
             waited_s: None,
         }
     }
+}
+
+fn full_resolution() -> usize {
+    1
 }
 
 /// A plane in `report.json`.
@@ -168,6 +178,8 @@ mod tests {
             program: "weavelight 0.1.0".into(),
             method: "auto".into(),
             size_px: [2, 3],
+            scale: 1,
+            swatch: None,
             lights_used: vec![0, 2, 3],
             pixels: 6,
             solved: 5,

@@ -1,6 +1,7 @@
 //! What is up to date is not made again: a solution remembers the hash of everything it was made from.
 
-use super::{Device, Options, SolveError};
+use super::encode::map_files;
+use super::{Device, MaskChoice, Options, SolveError};
 use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE};
 use crate::session::Session;
@@ -9,25 +10,17 @@ use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Files that a solution always has.
-const ALWAYS: [&str; 6] = [
-    solution::NORMAL_EXR,
-    solution::ALBEDO_EXR,
-    solution::CONFIDENCE_EXR,
-    solution::NORMAL_PNG,
-    solution::ALBEDO_PNG,
-    solution::MASK_PNG,
-];
-
 /// Hash of inputs and settings together: the program's version, the settings, the manifest (which holds the frames'
-/// hashes), frames whose hash it lacks, the calibration's files and the mask.
+/// hashes), frames whose hash it lacks, the calibration's files and the mask. Which maps are made is no part of it: it does
+/// not change them.
 pub(crate) fn key(
     options: &Options,
     session: &Session,
     calibration: &Calibration,
 ) -> Result<String, SolveError> {
-    let mut text =
-        format!("{PROGRAM} {:?} {:?} {:?}", options.method, options.grid, options.normal_y);
+    let Options { method, grid, normal_y, scale, .. } = options;
+    let found = options.mask == MaskChoice::Found;
+    let mut text = format!("{PROGRAM} {method:?} {grid:?} {normal_y:?} {scale:?} {found}");
     // Who solves without being named must not matter; one that is asked for by name is to be asked.
     if matches!(options.device, Device::Gpu) {
         text.push_str(" gpu");
@@ -36,7 +29,7 @@ pub(crate) fn key(
     let mut files = vec![session.manifest_path()];
     files.extend(unhashed.map(|frame| session.frame_path(frame)));
     files.extend(calibration_files(&calibration.folder)?);
-    files.extend(options.mask.clone().or_else(|| session.mask_path()));
+    files.extend(options.mask.file(session));
     let hashes: Vec<Result<String, FileError>> =
         files.par_iter().map(|path| sha256_of_file(path)).collect();
     for hash in hashes {
@@ -63,17 +56,18 @@ fn calibration_files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     Ok(paths)
 }
 
-/// The report of the solution that stands at `out`, if it is whole, has this key, and every frame still is what the
-/// manifest says; with the page, where one is asked for.
+/// The report of the solution that stands at the output's place, if it has every map that is asked for and this key, and
+/// every frame still is what the manifest says; with the page, where one is asked for.
 pub(crate) fn still_current(
-    out: &Path,
+    options: &Options,
     key: &str,
     session: &Session,
     with_page: bool,
 ) -> Option<Report> {
-    let report = Report::read(&out.join(REPORT_JSON)).ok()?;
-    let there = |name: &&str| out.join(name).is_file();
-    let whole = ALWAYS.iter().all(there) && (!with_page || there(&solution::REPORT_HTML));
+    let report = Report::read(&options.out.join(REPORT_JSON)).ok()?;
+    let there = |name: &&str| options.out.join(name).is_file();
+    let page = with_page.then_some(solution::REPORT_HTML);
+    let whole = map_files(options.outputs).iter().chain(&page).all(there);
     let same = whole && report.key.as_deref() == Some(key);
     // Of a frame that was altered, reading it will tell.
     let unaltered =

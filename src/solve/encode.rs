@@ -1,7 +1,7 @@
 //! The files of a solution's maps.
 
 use super::finish::Finished;
-use super::options::NormalY;
+use super::options::{NormalY, Options, Outputs};
 use super::progress::{Progress, Stage};
 use crate::files::FileError;
 use crate::raster::{
@@ -13,38 +13,53 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use weavelight_calibration::description::Image;
 
-type Encoder<'a> = Box<dyn Fn() -> Result<(), FileError> + Send + Sync + 'a>;
+/// Names of the files in which these maps are.
+pub(crate) fn map_files(outputs: Outputs) -> Vec<&'static str> {
+    let Outputs { normal, albedo, confidence, png } = outputs;
+    let files = [
+        (normal, solution::NORMAL_EXR),
+        (albedo, solution::ALBEDO_EXR),
+        (confidence, solution::CONFIDENCE_EXR),
+        (normal && png, solution::NORMAL_PNG),
+        (albedo && png, solution::ALBEDO_PNG),
+        (true, solution::MASK_PNG),
+    ];
+    files.into_iter().filter(|(wanted, _)| *wanted).map(|(_, name)| name).collect()
+}
 
-/// Writes all maps into `folder`, several files at a time.
+/// Writes the maps that are asked for into `folder`, several files at a time.
 pub(crate) fn write_maps(
     folder: &Path,
     maps: &Finished,
-    normal_y: NormalY,
+    options: &Options,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<(), FileError> {
-    let path = |name: &str| folder.join(name);
-    let jobs: Vec<Encoder> = vec![
-        Box::new(|| write_exr_rgb(&path(solution::NORMAL_EXR), &maps.normal)),
-        Box::new(|| write_exr_rgb(&path(solution::ALBEDO_EXR), &maps.albedo)),
-        Box::new(|| write_exr_y(&path(solution::CONFIDENCE_EXR), &maps.confidence)),
-        Box::new(|| {
-            let encode = |n| png_normal(n, normal_y);
-            write_png(&path(solution::NORMAL_PNG), &maps.normal, PngContent::Data, encode)
-        }),
-        Box::new(|| {
-            let table = srgb::Encode16::default();
-            let encode = |rgb: [f32; 3]| rgb.map(|linear| table.encode(linear));
-            write_png(&path(solution::ALBEDO_PNG), &maps.albedo, PngContent::Srgb, encode)
-        }),
-        Box::new(|| write_png_grey8(&path(solution::MASK_PNG), &maps.mask)),
-    ];
+    let table = srgb::Encode16::default();
+    let write = |name: &str| {
+        let path = folder.join(name);
+        match name {
+            solution::NORMAL_EXR => write_exr_rgb(&path, &maps.normal),
+            solution::ALBEDO_EXR => write_exr_rgb(&path, &maps.albedo),
+            solution::CONFIDENCE_EXR => write_exr_y(&path, &maps.confidence),
+            solution::NORMAL_PNG => {
+                let encode = |n| png_normal(n, options.normal_y);
+                write_png(&path, &maps.normal, PngContent::Data, encode)
+            }
+            solution::ALBEDO_PNG => {
+                let encode = |rgb: [f32; 3]| rgb.map(|linear| table.encode(linear));
+                write_png(&path, &maps.albedo, PngContent::Srgb, encode)
+            }
+            _ => write_png_grey8(&path, &maps.mask),
+        }
+    };
+    let files = map_files(options.outputs);
     let finished = AtomicUsize::new(0);
-    let total = jobs.len();
-    let results: Vec<Result<(), FileError>> = jobs
+    let total = files.len();
+    let results: Vec<Result<(), FileError>> = files
         .par_iter()
         .with_max_len(1)
-        .map(|write| {
-            let result = write();
+        .map(|name| {
+            let result = write(name);
             let done = finished.fetch_add(1, Ordering::Relaxed) + 1;
             progress(Progress { stage: Stage::Write, done, total });
             result

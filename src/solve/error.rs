@@ -93,6 +93,12 @@ pub enum SolveError {
         /// The frames' size.
         frames: String,
     },
+    /// A mask that is not the one found.
+    #[error("{}: is not the mask that is found in the frames, so it may have been edited and was kept; --force replaces it", .path.display())]
+    EditedMask {
+        /// The mask.
+        path: PathBuf,
+    },
     /// A mask without a white pixel.
     #[error("{} leaves nothing to solve; paint the swatch white", .path.display())]
     EmptyMask {

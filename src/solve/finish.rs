@@ -1,6 +1,7 @@
 //! From maps on the mosaic to the maps of a solution: colour, and the grid that was asked for.
 
 use super::maps::{Albedo, Maps, is_solved};
+use super::options::Outputs;
 use crate::instrument::Color;
 use crate::photometry::Outcome;
 use crate::raw::demosaic;
@@ -13,7 +14,7 @@ use weavelight_calibration::projection::Projector;
 pub struct Finished {
     /// Unit normals, rig frame.
     pub normal: Image<[f32; 3]>,
-    /// Linear RGB.
+    /// Linear RGB; without a pixel where nobody asked for it.
     pub albedo: Image<[f32; 3]>,
     /// Expected error of the normal, degrees.
     pub confidence: Image<f32>,
@@ -29,14 +30,15 @@ pub(crate) fn color_space(color: &Color) -> &'static str {
     }
 }
 
-/// Gives the albedo its hidden channels and the colour space of the calibration.
-pub(crate) fn finish(maps: Maps, color: &Color) -> Finished {
+/// Gives the albedo, if it is wanted, its hidden channels and the colour space of the calibration.
+pub(crate) fn finish(maps: Maps, color: &Color, outputs: Outputs) -> Finished {
     let Maps { normal, albedo, expected_error_deg, outcome, .. } = maps;
     let width = outcome.width;
     let mask = |outcome: &Outcome| if is_solved(*outcome) { 255 } else { 0 };
     let mask =
         Image { width, height: outcome.height, data: outcome.data.par_iter().map(mask).collect() };
     let mut albedo = match albedo {
+        _ if !outputs.albedo => Image::filled(0, 0, [0.0; 3]),
         Albedo::Mosaic(mosaic, cfa) => {
             demosaic(&mosaic, cfa, &|x, y| mask.data[y * width + x] != 0)
         }
@@ -73,12 +75,15 @@ pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
     let projector = Projector::new(camera);
     let mut out = Finished {
         normal: Image::filled(width, height, [0.0; 3]),
-        albedo: Image::filled(width, height, [0.0; 3]),
+        albedo: Image::filled(maps.albedo.width, maps.albedo.height, [0.0; 3]),
         confidence: Image::filled(width, height, 0.0),
         mask: Image::filled(width, height, 0),
     };
     let Finished { normal, albedo, confidence, mask } = &mut out;
-    let rows = normal.data.par_chunks_mut(width).zip(albedo.data.par_chunks_mut(width));
+    // Without an albedo its rows are empty.
+    let mut albedo_rows: Vec<&mut [[f32; 3]]> = albedo.data.chunks_mut(width).collect();
+    albedo_rows.resize_with(height, || &mut []);
+    let rows = normal.data.par_chunks_mut(width).zip(albedo_rows);
     let rows = rows.zip(confidence.data.par_chunks_mut(width)).zip(mask.data.par_chunks_mut(width));
     rows.enumerate().for_each(|(v, (((normal, albedo), confidence), mask))| {
         for u in 0..width {
@@ -92,7 +97,9 @@ pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
             let length = mean_normal.norm();
             if length > 0.0 {
                 normal[u] = (mean_normal / length).into();
-                albedo[u] = taps.mean(&maps.albedo);
+                if let Some(albedo) = albedo.get_mut(u) {
+                    *albedo = taps.mean(&maps.albedo);
+                }
                 confidence[u] = taps.mean_of(|at| [maps.confidence.data[at], 0.0, 0.0])[0];
                 mask[u] = 255;
             }

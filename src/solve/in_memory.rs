@@ -6,6 +6,7 @@ use super::check::{check_frames, check_light_field};
 use super::device::{Chosen, Device, choose};
 use super::estimate::noise_of_residuals;
 use super::field::{LightField, Unseen};
+use super::idle::leave_out_idle_frames;
 use super::maps::Maps;
 use super::noise::{LinearNoise, full_scale};
 use super::on_gpu::{OnGpu, report_of};
@@ -77,19 +78,22 @@ pub fn solve_scene_on(
     Ok(SolvedScene { maps, warnings, device })
 }
 
-/// Leaves out lights that add nothing; warnings about these and about lights that contradict the others.
+/// Leaves out frames that repeat another or clip everywhere, and lights that stayed dark; warnings about these and about
+/// lights that contradict the others.
 ///
 /// # Errors
 /// As [`solve_scene`].
-pub fn leave_out_dark_lights(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
+pub fn leave_out_what_adds_nothing(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
     check_frames(scene)?;
+    let mut warnings = leave_out_idle_frames(scene);
     let verdict = question(scene, &light_field(scene)?);
     let mut position = 0;
     scene.lights.retain(|_| {
         position += 1;
         !verdict.dark.contains(&(position - 1))
     });
-    Ok(verdict.warnings)
+    warnings.extend(verdict.warnings);
+    Ok(warnings)
 }
 
 /// The light field of a scene's lights.

@@ -1,7 +1,8 @@
 //! From two folders to a scene in memory.
 
 use super::drift::drift_warnings;
-use super::in_memory::leave_out_dark_lights;
+use super::in_memory::leave_out_what_adds_nothing;
+use super::options::MaskChoice;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
@@ -10,7 +11,7 @@ use crate::raster::{Values, decode_picture};
 use crate::raw::{Encoding, Frame, Hint, ReadError, decode};
 use crate::session::{self, FrameEntry, Kind, Session};
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use weavelight_calibration::description::{Image, Light};
 
@@ -34,7 +35,7 @@ pub fn load_scene(session: &Path, calibration: &Path) -> Result<(Scene, Vec<Stri
     let options = Options::new(session, calibration, "");
     let (session, calibration) = (Session::load(session)?, Calibration::load(calibration)?);
     let Loaded { mut scene, mut warnings } = load(&options, &session, calibration, &|_| {})?;
-    warnings.extend(leave_out_dark_lights(&mut scene)?);
+    warnings.extend(leave_out_what_adds_nothing(&mut scene)?);
     Ok((scene, warnings))
 }
 
@@ -59,9 +60,20 @@ pub(crate) fn load(
         .map(|(entry, frame)| (entry.light, exposure(session, entry, frame)))
         .collect();
     warnings.extend(drift_warnings(&scene, &drift));
-    let mask = options.mask.clone().or_else(|| session.mask_path());
+    let mask = options.mask.file(session);
     scene.mask = mask.map(|path| read_mask(&path, &scene)).transpose()?;
     Ok(Loaded { scene, warnings })
+}
+
+impl MaskChoice {
+    /// The picture that says it, if one does.
+    pub(super) fn file(&self, session: &Session) -> Option<PathBuf> {
+        match self {
+            MaskChoice::OfSession => session.mask_path(),
+            MaskChoice::Everything | MaskChoice::Found => None,
+            MaskChoice::File(path) => Some(path.clone()),
+        }
+    }
 }
 
 fn check_folders(session: &Session, calibration: &Calibration) -> Result<(), SolveError> {
@@ -250,7 +262,7 @@ fn arrange(
 }
 
 /// Any picture of the frames' size; what is not black is inside.
-fn read_mask(path: &Path, scene: &Scene) -> Result<Image<bool>, SolveError> {
+pub(super) fn read_mask(path: &Path, scene: &Scene) -> Result<Image<bool>, SolveError> {
     let bytes =
         std::fs::read(path).map_err(|source| crate::files::FileError::read(path, source))?;
     let picture = decode_picture(&bytes)

@@ -4,6 +4,7 @@
 //! finds the colour of the albedo and writes the folder. [`solve_scene`] is the middle of it, in memory.
 
 mod bands;
+mod blocks;
 mod check;
 mod current;
 mod device;
@@ -16,21 +17,27 @@ mod field;
 mod field_grid;
 mod finish;
 mod gain;
+mod idle;
 mod in_memory;
 mod load;
 mod maps;
+mod mask_file;
 mod noise;
 mod on_gpu;
 mod options;
 pub mod preview;
 mod progress;
+mod progressive;
+mod reduce;
 #[cfg(test)]
 mod reference;
+mod region;
 mod rows;
 mod run;
 mod scene;
 mod sensor;
 mod signal;
+mod swatch;
 #[cfg(test)]
 mod tests;
 mod witness;
@@ -38,11 +45,16 @@ mod witness;
 pub use device::Device;
 pub use error::SolveError;
 pub use finish::Finished;
-pub use in_memory::{SolvedScene, leave_out_dark_lights, solve_scene, solve_scene_on};
+pub use in_memory::{SolvedScene, leave_out_what_adds_nothing, solve_scene, solve_scene_on};
 pub use load::load_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
-pub use options::{Grid, NormalY, Options, Reuse};
+pub use mask_file::{MASK_FILE, MaskMade, MaskOptions, make_mask};
+pub use options::{Grid, MaskChoice, NormalY, Options, Outputs, Reuse};
+pub use preview::Scale;
 pub use progress::{Progress, Stage};
+pub use progressive::{Level, progressively};
+pub use reduce::reduced_camera;
 pub use rows::Rows;
 pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};
+pub use swatch::{Swatch, find_swatch};

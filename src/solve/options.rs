@@ -1,4 +1,5 @@
 use super::Device;
+use super::preview::Scale;
 use crate::photometry::Method;
 use std::path::PathBuf;
 
@@ -17,14 +18,52 @@ pub struct Options {
     pub grid: Grid,
     /// Where green points in `normal.png`.
     pub normal_y: NormalY,
-    /// The swatch, white on black; instead of the capture session's own mask.
-    pub mask: Option<PathBuf>,
+    /// Where the swatch is.
+    pub mask: MaskChoice,
+    /// Which maps are made.
+    pub outputs: Outputs,
+    /// Photosites that a pixel of the maps spans, each way; a preview where that is more than one.
+    pub scale: Scale,
     /// Threads; `None`: one per core. The result does not depend on it.
     pub threads: Option<usize>,
     /// Who solves photosites that have all their samples.
     pub device: Device,
     /// Whether a solution that is up to date is made again.
     pub reuse: Reuse,
+}
+
+/// Where the swatch is: the table around it is not solved.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum MaskChoice {
+    /// In the capture session's own mask; everywhere if it has none.
+    #[default]
+    OfSession,
+    /// Everywhere.
+    Everything,
+    /// Where it is found in the frames; everywhere if it cannot be told from the table.
+    Found,
+    /// In a picture of the frames' size, where it is not black.
+    File(PathBuf),
+}
+
+/// The maps of a solution; the mask and the report are always made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outputs {
+    /// `normal.exr`.
+    pub normal: bool,
+    /// `albedo.exr`.
+    pub albedo: bool,
+    /// `confidence.exr`.
+    pub confidence: bool,
+    /// `normal.png` and `albedo.png`, of those maps that are made.
+    pub png: bool,
+}
+
+impl Outputs {
+    /// Every map.
+    pub const ALL: Self = Self { normal: true, albedo: true, confidence: true, png: true };
+    /// No map.
+    pub const NONE: Self = Self { normal: false, albedo: false, confidence: false, png: false };
 }
 
 /// What to do where the same solution stands already.
@@ -58,7 +97,8 @@ pub enum NormalY {
 }
 
 impl Options {
-    /// The default way: method auto, the sensor's grid, +y up, the capture session's mask, all cores, no graphics processor.
+    /// The default way: method auto, every map at full resolution on the sensor's grid, +y up, the capture session's mask, all
+    /// cores, no graphics processor.
     pub fn new(
         session: impl Into<PathBuf>,
         calibration: impl Into<PathBuf>,
@@ -71,7 +111,9 @@ impl Options {
             method: Method::Auto,
             grid: Grid::Sensor,
             normal_y: NormalY::Up,
-            mask: None,
+            mask: MaskChoice::OfSession,
+            outputs: Outputs::ALL,
+            scale: Scale::Full,
             threads: None,
             device: Device::Cpu,
             reuse: Reuse::IfCurrent,

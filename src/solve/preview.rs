@@ -30,6 +30,11 @@ pub enum Scale {
     Eighth = 8,
 }
 
+impl Scale {
+    /// From the smallest picture to the whole one.
+    pub const GROWING: [Scale; 4] = [Scale::Eighth, Scale::Quarter, Scale::Half, Scale::Full];
+}
+
 /// The sums.
 #[derive(Debug)]
 pub struct Accumulator {

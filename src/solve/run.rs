@@ -4,12 +4,14 @@ use super::SolveError;
 use super::current::{key, still_current};
 use super::encode::write_maps;
 use super::finish::{Finished, color_space, finish, pinhole, undistort};
-use super::in_memory::{SolvedScene, leave_out_dark_lights, solve_scene_on};
+use super::in_memory::{SolvedScene, leave_out_what_adds_nothing, solve_scene_on};
 use super::load::{Loaded, load};
 use super::maps::Counts;
-use super::options::{Grid, Options, Reuse};
+use super::options::{Grid, MaskChoice, Options, Outputs, Reuse};
+use super::preview::Scale;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Scene};
+use super::swatch::find_swatch;
 use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
 use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE, MeasuredCamera, write_camera,
@@ -93,7 +95,7 @@ fn run_on_this_pool(
         inputs: inputs(&session, &calibration)?,
     };
     let before = match options.reuse {
-        Reuse::IfCurrent => still_current(&options.out, &made_from.key, &session, page.is_some()),
+        Reuse::IfCurrent => still_current(options, &made_from.key, &session, page.is_some()),
         Reuse::Never => None,
     };
     if let Some(report) = before {
@@ -121,7 +123,16 @@ fn make(
     let staged = StagedFolder::create(&options.out, OUTPUT)?;
     let Loaded { mut scene, mut warnings } = load(options, session, calibration, progress)?;
     watch.lap(Stage::Read);
-    warnings.extend(leave_out_dark_lights(&mut scene)?);
+    warnings.extend(leave_out_what_adds_nothing(&mut scene)?);
+    let mut swatch = None;
+    if options.mask == MaskChoice::Found {
+        let found = find_swatch(&scene, &|_| {})?;
+        scene.mask = (found.table_share > 0.0).then_some(found.mask);
+        swatch = Some(found.said);
+    }
+    if options.scale != Scale::Full {
+        scene = scene.reduced(options.scale);
+    }
     let SolvedScene { maps, warnings: of_solve, device } =
         solve_scene_on(&scene, options.method, &options.device, progress)?;
     warnings.extend(of_solve);
@@ -129,9 +140,11 @@ fn make(
     let frames = if page.is_some() { previews(&scene) } else { Vec::new() };
     let rest = Rest::of(scene);
     let counts = maps.counts;
-    let finished = on_grid(finish(maps, &rest.color), rest.camera.as_ref(), options.grid);
+    let shown = page.is_some();
+    let wanted = Outputs { albedo: options.outputs.albedo || shown, ..options.outputs };
+    let finished = on_grid(finish(maps, &rest.color, wanted), rest.camera.as_ref(), options.grid);
     watch.lap(Stage::Colour);
-    write_maps(staged.path(), &finished, options.normal_y, progress)?;
+    write_maps(staged.path(), &finished, options, progress)?;
     copy_camera(&rest, options, staged.path())?;
     watch.lap(Stage::Write);
     let mut report = report(options, &rest, &finished, counts);
@@ -139,6 +152,7 @@ fn make(
     report.device = Some(device);
     report.inputs = made_from.inputs;
     report.key = Some(made_from.key);
+    report.swatch = swatch;
     report.seconds = watch.seconds.clone();
     if let Some(page) = page {
         let shown =
@@ -211,14 +225,17 @@ fn on_grid(maps: Finished, camera: Option<&Camera>, grid: Grid) -> Finished {
     }
 }
 
-/// The camera that the maps' pixels belong to: the calibration's file as it is, or without its distortion.
+/// The camera that the maps' pixels belong to: the calibration's file as it is, or without its distortion, or of a preview.
 fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), SolveError> {
     let Some(camera) = &rest.camera else { return Ok(()) };
     let target = folder.join(CAMERA_FILE);
     match options.grid {
-        Grid::Sensor => {
+        Grid::Sensor if options.scale == Scale::Full => {
             let copied = std::fs::copy(&rest.calibrated_camera, &target);
             copied.map_err(|source| crate::files::FileError::write(&target, source))?;
+        }
+        Grid::Sensor => {
+            write_camera(folder, &MeasuredCamera::new(camera.clone()), &Default::default())?;
         }
         Grid::Undistorted => {
             write_camera(folder, &MeasuredCamera::new(pinhole(camera)), &Default::default())?;
@@ -238,6 +255,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         program: PROGRAM.to_owned(),
         method: method_name(options.method).to_owned(),
         size_px: [maps.mask.width, maps.mask.height],
+        scale: options.scale as usize,
         lights_used: rest.lights_used.clone(),
         pixels: rest.pixels as u64,
         solved: maps.mask.data.iter().filter(|&&solved| solved != 0).count() as u64,
@@ -258,6 +276,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         inputs: vec![],
         device: None,
         key: None,
+        swatch: None,
     }
 }
 

@@ -12,6 +12,8 @@
     reason = "a benchmark prints, and stops at the first error"
 )]
 
+mod skips;
+
 use nalgebra::{Point3, UnitVector3, Vector3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -104,6 +106,7 @@ fn in_memory((width, height): (usize, usize)) {
     ] {
         previews(name, scale, &mut scene, touch);
     }
+    skips::report(&scene);
 }
 
 /// The same with a graphics processor, transfers included, where there is one.

@@ -267,7 +267,7 @@ fn a_mask_keeps_the_table_out_and_changes_nothing_inside() {
         image::GrayImage::from_fn(90, 50, |x, y| image::Luma([if inside(x, y) { 255 } else { 0 }]));
     let path = folders.root.path().join("mask.png");
     mask.save(&path).unwrap();
-    let options = Options { mask: Some(path), ..folders.options() };
+    let options = Options { mask: MaskChoice::File(path), ..folders.options() };
     folders.run(&options);
     let masked = crate::raster::read_exr(&options.out.join("normal.exr")).unwrap();
     let (whole, _) = solve_scene(&made, Method::Auto, &|_| {}).unwrap();

@@ -1,0 +1,94 @@
+//! The mask of a capture session as a picture that people can edit.
+
+use super::load::{load, read_mask};
+use super::options::{MaskChoice, Options, Reuse};
+use super::swatch::{Swatch, find_swatch};
+use super::{Progress, SolveError, leave_out_what_adds_nothing};
+use crate::files::{FileError, write_atomic};
+use crate::instrument::Calibration;
+use crate::raster::encode_png_grey8;
+use crate::session::Session;
+use std::path::{Path, PathBuf};
+use weavelight_calibration::description::Image;
+
+/// Its name in a capture session.
+pub const MASK_FILE: &str = "mask.png";
+
+/// Which mask to make.
+#[derive(Clone, Debug)]
+pub struct MaskOptions {
+    /// The capture session's folder.
+    pub session: PathBuf,
+    /// The calibration's folder.
+    pub calibration: PathBuf,
+    /// The picture to write; [`MASK_FILE`] in the capture session where absent.
+    pub out: Option<PathBuf>,
+    /// Whether a picture that stands there already and differs is replaced.
+    pub reuse: Reuse,
+}
+
+/// A mask that stands on disk.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskMade {
+    /// The picture.
+    pub path: PathBuf,
+    /// What it shows.
+    pub swatch: Swatch,
+    /// Whether the same picture was there already.
+    pub up_to_date: bool,
+    /// Whether the capture session names it, so that a solve heeds it.
+    pub named: bool,
+    /// What reading the frames had to say.
+    pub warnings: Vec<String>,
+}
+
+/// Finds the swatch, writes it white on black, and names the picture in `session.toml` where it lies in the capture
+/// session. A picture that differs from what would be written may have been edited, and is kept.
+///
+/// # Errors
+/// Where the frames cannot be read or solved, the picture cannot be written, or another stands in its place.
+pub fn make_mask(
+    options: &MaskOptions,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<MaskMade, SolveError> {
+    let mut session = Session::load(&options.session)?;
+    let calibration = Calibration::load(&options.calibration)?;
+    let path = options.out.clone().unwrap_or_else(|| session.folder.join(MASK_FILE));
+    let solving = Options {
+        mask: MaskChoice::Everything,
+        ..Options::new(&options.session, &options.calibration, "")
+    };
+    let loaded = load(&solving, &session, calibration, progress)?;
+    let (mut scene, mut warnings) = (loaded.scene, loaded.warnings);
+    let stands = (path.exists() && options.reuse == Reuse::IfCurrent)
+        .then(|| read_mask(&path, &scene))
+        .transpose()?;
+    warnings.extend(leave_out_what_adds_nothing(&mut scene)?);
+    let swatch = find_swatch(&scene, progress)?;
+    let up_to_date = match stands {
+        Some(mask) if mask != swatch.mask => return Err(SolveError::EditedMask { path }),
+        Some(_) => true,
+        None => write_mask(&path, &swatch.mask).map(|()| false)?,
+    };
+    let named = name_in_session(&mut session, &path)?;
+    Ok(MaskMade { path, swatch, up_to_date, named, warnings })
+}
+
+fn write_mask(path: &Path, mask: &Image<bool>) -> Result<(), FileError> {
+    let data = mask.data.iter().map(|&inside| if inside { 255 } else { 0 }).collect();
+    let picture = Image { width: mask.width, height: mask.height, data };
+    let bytes = encode_png_grey8(&picture).map_err(|source| FileError::write(path, source))?;
+    write_atomic(path, &bytes)
+}
+
+/// Records the mask where it lies in the capture session's folder; true if it does.
+fn name_in_session(session: &mut Session, path: &Path) -> Result<bool, SolveError> {
+    let full = |path: &Path| path.canonicalize().map_err(|source| FileError::read(path, source));
+    let (folder, path) = (full(&session.folder)?, full(path)?);
+    let Ok(inside) = path.strip_prefix(&folder) else { return Ok(false) };
+    if session.mask.as_deref() != Some(inside) {
+        session.mask = Some(inside.to_owned());
+        session.save()?;
+    }
+    Ok(true)
+}

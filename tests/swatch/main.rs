@@ -1,0 +1,13 @@
+//! Small pieces of cloth as the simulated rig photographs them: swapped lights, the table around a swatch, and what a solve
+//! leaves undone.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot set its scene up has failed; figures are to be seen"
+)]
+
+mod commands;
+mod outline;
+mod photograph;
+mod swapped_lights;
