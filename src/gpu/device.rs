@@ -1,7 +1,7 @@
 //! A graphics processor, opened through Vulkan.
 
+use super::buffers::{Buffers, Flight};
 use super::pack::Packed;
-use super::slot::{Flight, Slot};
 use super::{Adapter, GpuError, Tile};
 use crate::photometry::Method;
 use std::future::Future;
@@ -26,7 +26,7 @@ pub struct Gpu {
     least_squares: wgpu::ComputePipeline,
     weighted: wgpu::ComputePipeline,
     /// Buffers that no tile uses.
-    idle: Mutex<Vec<Slot>>,
+    idle: Mutex<Vec<Buffers>>,
     /// The first complaint of the driver.
     complaint: Arc<Mutex<Option<String>>>,
 }
@@ -88,22 +88,30 @@ impl Gpu {
         if packed.largest_binding() > LARGEST_BINDING {
             return Err(self.failed(&"a tile of more than 128 MB"));
         }
-        let mut slot = self.take_slot();
-        slot.fill(self, tile, &packed)?;
+        let buffers = self.buffers_for(&packed);
+        buffers.fill(self, tile, &packed)?;
         let pipeline = match tile.method {
             Method::LeastSquares => &self.least_squares,
             _ => &self.weighted,
         };
-        Ok(slot.launch(self, pipeline, packed))
+        Ok(buffers.launch(self, pipeline, packed))
     }
 
-    fn take_slot(&self) -> Slot {
-        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        idle.pop().unwrap_or_default()
+    /// Idle buffers, or larger ones in their place.
+    fn buffers_for(&self, packed: &Packed) -> Buffers {
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let fit = idle.filter(|buffers| buffers.fit(packed));
+        fit.unwrap_or_else(|| Buffers::new(&self.device, packed))
     }
 
-    pub(super) fn give_back(&self, slot: Slot) {
-        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(slot);
+    pub(super) fn give_back(&self, buffers: Buffers) {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(buffers);
+    }
+
+    /// Makes the driver complain from now on.
+    #[cfg(test)]
+    pub(crate) fn spoil(&self) {
+        note(&self.complaint, "spoilt\nby a test");
     }
 
     /// What the driver has complained of.

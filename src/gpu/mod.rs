@@ -8,12 +8,12 @@
 mod absent;
 mod adapter;
 #[cfg(feature = "gpu")]
+mod buffers;
+#[cfg(feature = "gpu")]
 mod device;
 mod error;
 #[cfg(feature = "gpu")]
 mod pack;
-#[cfg(feature = "gpu")]
-mod slot;
 #[cfg(test)]
 #[cfg(feature = "gpu")]
 pub(crate) mod tests;
@@ -23,8 +23,8 @@ mod tile;
 pub use absent::{Flight, Gpu};
 pub use adapter::Adapter;
 #[cfg(feature = "gpu")]
+pub use buffers::Flight;
+#[cfg(feature = "gpu")]
 pub use device::Gpu;
 pub use error::GpuError;
-#[cfg(feature = "gpu")]
-pub use slot::Flight;
 pub use tile::{Answer, Tile, TileRow};

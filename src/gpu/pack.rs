@@ -91,6 +91,11 @@ impl Packed {
         self.sites() * FOUND_PLANES * size_of::<f32>()
     }
 
+    /// Bytes that go up.
+    pub(super) fn up_bytes(&self) -> usize {
+        self.regions().map(|region| region.end).into_iter().fold(0, usize::max)
+    }
+
     /// Bytes of the largest binding.
     pub(super) fn largest_binding(&self) -> usize {
         self.regions().map(|region| region.len()).into_iter().fold(self.found_bytes(), usize::max)

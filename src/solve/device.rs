@@ -36,6 +36,9 @@ pub(crate) struct Chosen {
 
 /// Samples of a picture that the processor solves before a graphics processor is found: two megapixels under ten lights.
 const WORTH_ASKING: usize = 20_000_000;
+/// Rows to begin with, a thread: a graphics processor that takes this many times as long there is not worth more time.
+const FEW_ROWS: usize = 16;
+const HOPELESS: f64 = 4.0;
 /// Rows to measure with, a thread.
 const MEASURED_ROWS: usize = 128;
 /// Measurements of each, the shortest counts.
@@ -108,18 +111,18 @@ fn kind_of(run: &Run) -> String {
 
 /// Nanoseconds a photosite by the processor and by the graphics processor, transfers and what it leaves over included.
 fn measure(run: &Run, gpu: &Gpu) -> Result<[f64; 2], String> {
-    let rows = middle_rows(run);
     let on = OnGpu::new(gpu);
-    let mut least = [f64::INFINITY; 2];
-    for round in 0..=MEASUREMENTS {
-        for (who, least) in [None, Some(&on)].into_iter().zip(&mut least) {
-            let begun = Instant::now();
-            let maps = run.solve_rows(rows.clone(), who, &|_| {});
-            let photosites = (maps.outcome.width * maps.outcome.height) as f64;
-            // The first round warms up.
-            if round > 0 {
-                *least = least.min(1e9 * begun.elapsed().as_secs_f64() / photosites);
-            }
+    let threads = rayon::current_num_threads();
+    let few = middle_rows(run, FEW_ROWS * threads);
+    // The first one warms up.
+    let _ = time_rows(run, &on, few.clone());
+    let mut least = time_rows(run, &on, few);
+    if least[1] < HOPELESS * least[0] {
+        let many = middle_rows(run, MEASURED_ROWS * threads);
+        least = [f64::INFINITY; 2];
+        for _ in 0..MEASUREMENTS {
+            let times = time_rows(run, &on, many.clone());
+            least.iter_mut().zip(times).for_each(|(least, time)| *least = least.min(time));
         }
     }
     match on.failure() {
@@ -128,10 +131,20 @@ fn measure(run: &Run, gpu: &Gpu) -> Result<[f64; 2], String> {
     }
 }
 
+/// One measurement of both.
+fn time_rows(run: &Run, on: &OnGpu, rows: Range<usize>) -> [f64; 2] {
+    [None, Some(on)].map(|who| {
+        let begun = Instant::now();
+        let maps = run.solve_rows(rows.clone(), who, &|_| {});
+        let photosites = maps.outcome.width * maps.outcome.height;
+        1e9 * begun.elapsed().as_secs_f64() / photosites as f64
+    })
+}
+
 /// Rows out of the middle of what is to be solved.
-fn middle_rows(run: &Run) -> Range<usize> {
+fn middle_rows(run: &Run, most: usize) -> Range<usize> {
     let all = run.rows_inside();
-    let count = all.len().min(MEASURED_ROWS * rayon::current_num_threads());
+    let count = all.len().min(most);
     let first = all.start + (all.len() - count) / 2;
     first..first + count
 }

@@ -230,3 +230,19 @@ fn lights_nearly_in_a_plane_go_to_float64() {
         check_same(&format!("{elevation_deg} degrees"), &Rows::new(scenes));
     }
 }
+
+#[test]
+fn every_binding_of_a_tile_is_one_that_all_devices_offer() {
+    const OFFERED: usize = 128 << 20;
+    for lights in [3, 10, 64] {
+        for width in [1, 640, 4928, 14_000, 65_535] {
+            let rows = gpu().rows_at_once(width, lights);
+            assert!(rows > 0);
+            // A piece of one column each: twelve numbers and six a light; a plane a light and one for the noise; five come back.
+            for numbers in [12 + 6 * lights, lights + 1, 5] {
+                let bytes = 4 * numbers * width * rows;
+                assert!(bytes <= OFFERED, "{lights} lights, {rows} rows of {width}: {bytes}");
+            }
+        }
+    }
+}

@@ -104,6 +104,20 @@ fn every_kind_of_scene_comes_out_the_same() {
     }
 }
 
+/// The processor takes over, from the tile under way on.
+#[test]
+fn a_driver_that_fails_costs_no_photosite() {
+    let made = scene(Recipe { height: 300, ..Recipe::default() });
+    let spoilt = Gpu::open().expect("a device");
+    spoilt.spoil();
+    let device = Device::Opened(Arc::new(spoilt));
+    let solved = solve_scene_on(&made, Method::Auto, &device, &|_| {}).expect("a scene");
+    let (here, _) = solve_scene(&made, Method::Auto, &|_| {}).expect("a scene");
+    assert_eq!((solved.maps.normal, solved.maps.outcome), (here.normal, here.outcome));
+    let [warning] = solved.warnings.as_slice() else { panic!("{:?}", solved.warnings) };
+    assert!(warning.contains("failed (spoilt by a test); the processor solved"), "{warning}");
+}
+
 #[test]
 fn what_is_measured_decides() {
     let made = scene(Recipe { width: 200, height: 150, ..Recipe::default() });

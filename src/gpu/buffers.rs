@@ -14,12 +14,7 @@ const MOST_GROUPS: usize = 65_535;
 const GRAIN: usize = 1 << 20;
 
 /// Buffers, used again and again.
-#[derive(Default)]
-pub(super) struct Slot {
-    buffers: Option<Buffers>,
-}
-
-struct Buffers {
+pub(super) struct Buffers {
     /// Mapped for writing while no tile is in flight.
     up: wgpu::Buffer,
     input: wgpu::Buffer,
@@ -30,64 +25,18 @@ struct Buffers {
 /// A tile on its way.
 pub struct Flight<'g> {
     gpu: &'g Gpu,
-    slot: Slot,
+    buffers: Buffers,
     packed: Packed,
     submission: wgpu::SubmissionIndex,
     /// How mapping went, for what goes up next time and for what comes down.
     mapped: Receiver<Result<(), wgpu::BufferAsyncError>>,
 }
 
-impl Slot {
-    /// Writes a tile where the device can copy it from.
-    pub(super) fn fill(&mut self, gpu: &Gpu, tile: &Tile, packed: &Packed) -> Result<(), GpuError> {
-        let up_bytes = packed.regions().map(|region| region.end).into_iter().fold(0, usize::max);
-        let buffers = self.buffers_for(gpu, up_bytes, packed.found_bytes().max(size_of::<f32>()));
-        {
-            let view = buffers.up.get_mapped_range_mut(..);
-            let mut view = view.map_err(|error| gpu.failed(&error))?;
-            packed.write(tile, |at, bytes| {
-                view.slice(at..at + bytes.len()).copy_from_slice(bytes);
-            });
-        }
-        buffers.up.unmap();
-        Ok(())
-    }
-
-    fn buffers_for(&mut self, gpu: &Gpu, up: usize, down: usize) -> &Buffers {
-        let fits = self
-            .buffers
-            .take()
-            .filter(|buffers| buffers.up.size() >= up as u64 && buffers.down.size() >= down as u64);
-        self.buffers.insert(fits.unwrap_or_else(|| Buffers::new(&gpu.device, up, down)))
-    }
-
-    /// Copies up, solves, copies down.
-    pub(super) fn launch<'g>(
-        self,
-        gpu: &'g Gpu,
-        pipeline: &wgpu::ComputePipeline,
-        packed: Packed,
-    ) -> Flight<'g> {
-        let (told, mapped) = channel();
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        if let Some(buffers) = &self.buffers {
-            buffers.record(gpu, pipeline, &packed, &mut encoder);
-        }
-        let submission = gpu.queue.submit([encoder.finish()]);
-        if let Some(buffers) = &self.buffers {
-            for (buffer, mode) in [(&buffers.up, MapMode::Write), (&buffers.down, MapMode::Read)] {
-                let told = told.clone();
-                // Nobody listens where the flight was dropped.
-                buffer.map_async(mode, .., move |result| drop(told.send(result)));
-            }
-        }
-        Flight { gpu, slot: self, packed, submission, mapped }
-    }
-}
-
 impl Buffers {
-    fn new(device: &wgpu::Device, up: usize, down: usize) -> Self {
-        let (up, down) = (up.next_multiple_of(GRAIN), down.next_multiple_of(GRAIN));
+    /// Buffers that a tile fits.
+    pub(super) fn new(device: &wgpu::Device, packed: &Packed) -> Self {
+        let sizes = [packed.up_bytes(), packed.found_bytes()];
+        let [up, down] = sizes.map(|bytes| bytes.max(1).next_multiple_of(GRAIN));
         let buffer = |bytes: usize, usage: Usages, mapped_at_creation: bool| {
             let size = bytes as u64;
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -104,6 +53,43 @@ impl Buffers {
             found: buffer(down, Usages::STORAGE | Usages::COPY_SRC, false),
             down: buffer(down, Usages::MAP_READ | Usages::COPY_DST, false),
         }
+    }
+
+    /// Whether a tile fits.
+    pub(super) fn fit(&self, packed: &Packed) -> bool {
+        self.up.size() >= packed.up_bytes() as u64
+            && self.down.size() >= packed.found_bytes() as u64
+    }
+
+    /// Writes a tile where the device can copy it from.
+    pub(super) fn fill(&self, gpu: &Gpu, tile: &Tile, packed: &Packed) -> Result<(), GpuError> {
+        let view = self.up.get_mapped_range_mut(..);
+        let mut view = view.map_err(|error| gpu.failed(&error))?;
+        packed.write(tile, |at, bytes| {
+            view.slice(at..at + bytes.len()).copy_from_slice(bytes);
+        });
+        drop(view);
+        self.up.unmap();
+        Ok(())
+    }
+
+    /// Copies up, solves, copies down.
+    pub(super) fn launch<'g>(
+        self,
+        gpu: &'g Gpu,
+        pipeline: &wgpu::ComputePipeline,
+        packed: Packed,
+    ) -> Flight<'g> {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        self.record(gpu, pipeline, &packed, &mut encoder);
+        let submission = gpu.queue.submit([encoder.finish()]);
+        let (told, mapped) = channel();
+        for (buffer, mode) in [(&self.up, MapMode::Write), (&self.down, MapMode::Read)] {
+            let told = told.clone();
+            // Nobody listens where the flight was dropped.
+            buffer.map_async(mode, .., move |result| drop(told.send(result)));
+        }
+        Flight { gpu, buffers: self, packed, submission, mapped }
     }
 
     fn record(
@@ -157,7 +143,7 @@ impl Flight<'_> {
     /// # Errors
     /// Where the driver fails or hangs.
     pub fn land<T>(self, read: impl FnOnce(&Answer) -> T) -> Result<T, GpuError> {
-        let Self { gpu, slot, packed, submission, mapped } = self;
+        let Self { gpu, buffers, packed, submission, mapped } = self;
         let wait = PollType::Wait { submission_index: Some(submission), timeout: Some(PATIENCE) };
         let waited = gpu.device.poll(wait);
         if let Some(why) = gpu.complaint() {
@@ -168,7 +154,6 @@ impl Flight<'_> {
             let result = mapped.recv_timeout(PATIENCE).map_err(|error| gpu.failed(&error))?;
             result.map_err(|error| gpu.failed(&error))?;
         }
-        let Some(buffers) = &slot.buffers else { return Err(gpu.failed(&"no buffers")) };
         let value = {
             let bytes = packed.found_bytes() as u64;
             let view = buffers.down.get_mapped_range(0..bytes.max(4));
@@ -177,7 +162,7 @@ impl Flight<'_> {
             read(&Answer { values, before: &packed.before })
         };
         buffers.down.unmap();
-        gpu.give_back(slot);
+        gpu.give_back(buffers);
         Ok(value)
     }
 }
