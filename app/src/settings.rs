@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+pub use weavelight::solve::{MethodName, NormalYName, Settings as SolveSettings};
+
 /// What is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -39,31 +41,6 @@ pub enum Theme {
     Light,
     /// Light on dark.
     Dark,
-}
-
-/// As `weavelight solve` has them on the command line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct SolveSettings {
-    /// `--method`
-    pub method: MethodName,
-    /// `--undistort`
-    pub undistort: bool,
-    /// `--normal-y down`
-    pub normal_y_down: bool,
-}
-
-/// As on the command line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MethodName {
-    /// Robust where the residual asks for it.
-    #[default]
-    Auto,
-    /// Plain.
-    LeastSquares,
-    /// Robust everywhere.
-    Robust,
 }
 
 impl Default for Settings {
@@ -107,28 +84,6 @@ impl Settings {
             let _ = std::fs::create_dir_all(folder);
         }
         weavelight::files::write_atomic(file, text.as_bytes())
-    }
-}
-
-impl SolveSettings {
-    /// The library's options for a solve, the same that the command line makes.
-    pub fn options(
-        self,
-        session: &Path,
-        calibration: &Path,
-        out: &Path,
-    ) -> weavelight::solve::Options {
-        use weavelight::photometry::Method;
-        use weavelight::solve::{Grid, NormalY, Options};
-        let mut options = Options::new(session, calibration, out);
-        options.method = match self.method {
-            MethodName::Auto => Method::Auto,
-            MethodName::LeastSquares => Method::LeastSquares,
-            MethodName::Robust => Method::Robust,
-        };
-        options.grid = if self.undistort { Grid::Undistorted } else { Grid::Sensor };
-        options.normal_y = if self.normal_y_down { NormalY::Down } else { NormalY::Up };
-        options
     }
 }
 

@@ -165,13 +165,18 @@ fn the_window_solves_as_the_command_line_does() {
     let mut window = Window::new(desk::SMALL, egui::Theme::Dark);
     window.open_small_rig();
     window.enter(Room::Scan);
+    window.click("Solving");
+    window.click("Robust everywhere");
     window.click("Scan the swatch");
     window.until_label("Look closer");
     let rig = window.rig();
-    let options = weavelight::solve::Options::new(
-        rig.join("scans/linen 1"),
-        rig.join("calibration"),
-        rig.join("by-command"),
+    // As `weavelight solve --settings FILE` makes them.
+    window.harness.state().desk().settings.save().unwrap();
+    let settings = weavelight::solve::Settings::read(&window.home().join("settings.toml")).unwrap();
+    let options = settings.options(
+        &rig.join("scans/linen 1"),
+        &rig.join("calibration"),
+        &rig.join("by-command"),
     );
     weavelight::solve::run(&options, &|_| ()).unwrap();
     for file in

@@ -2,12 +2,11 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
+use crate::files::FileError;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{
-    self, Device, Grid, MaskChoice, NormalY, Options, Outputs, Reuse, Scale, Shown,
-};
+use crate::solve::{self, MaskChoice, Options, Outputs, Reuse, Scale, Settings, Shown};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -29,22 +28,26 @@ pub(super) struct Args {
     /// Folder to write
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// How each photosite's normal is found
-    #[arg(long, default_value = "auto")]
-    method: MethodName,
+    /// Settings file whose [solve] table says method, undistort, normal-y and device where the options here do not: the
+    /// window's own, for the same maps
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// How each photosite's normal is found [default: auto]
+    #[arg(long)]
+    method: Option<MethodName>,
     /// Take the lens's distortion out of the maps
     #[arg(long)]
     undistort: bool,
-    /// Where green points in normal.png
-    #[arg(long, default_value = "up")]
-    normal_y: NormalYName,
+    /// Where green points in normal.png [default: up]
+    #[arg(long)]
+    normal_y: Option<NormalYName>,
     /// Where to solve: a picture that is not black there, "auto" to leave out the table if it can be told from the swatch, or
     /// "none" for everywhere [default: the capture session's own mask]
     #[arg(long, value_name = "M.png|auto|none")]
     mask: Option<PathBuf>,
-    /// Who solves photosites that have all their samples
-    #[arg(long, default_value = "auto")]
-    device: DeviceName,
+    /// Who solves photosites that have all their samples [default: auto]
+    #[arg(long)]
+    device: Option<DeviceName>,
     /// Make only these, comma-separated: maps, png for both as pictures, page for report.html [default: all]
     #[arg(long, value_name = "MAP,...", value_delimiter = ',')]
     only: Vec<Wanted>,
@@ -79,22 +82,14 @@ enum DeviceName {
     Gpu,
 }
 
-impl From<DeviceName> for Device {
+impl From<DeviceName> for solve::DeviceName {
     fn from(name: DeviceName) -> Self {
         match name {
-            DeviceName::Auto => Self::Auto { memory: device_memory() },
+            DeviceName::Auto => Self::Auto,
             DeviceName::Cpu => Self::Cpu,
             DeviceName::Gpu => Self::Gpu,
         }
     }
-}
-
-/// The file among the user's cached ones that remembers what was measured.
-fn device_memory() -> Option<PathBuf> {
-    let given = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
-    let of_user = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache"));
-    let folder = given.filter(|path| path.is_absolute()).or_else(of_user)?;
-    Some(folder.join("weavelight").join("device.json"))
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -124,15 +119,39 @@ impl From<MethodName> for Method {
     }
 }
 
+impl From<MethodName> for solve::MethodName {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Auto => Self::Auto,
+            MethodName::LeastSquares => Self::LeastSquares,
+            MethodName::Robust => Self::Robust,
+        }
+    }
+}
+
+impl From<NormalYName> for solve::NormalYName {
+    fn from(name: NormalYName) -> Self {
+        match name {
+            NormalYName::Up => Self::Up,
+            NormalYName::Down => Self::Down,
+        }
+    }
+}
+
 impl Args {
-    fn options(&self) -> Options {
-        let mut options = Options::new(&self.session, &self.calibration, &self.out);
-        options.method = self.method.into();
-        options.grid = if self.undistort { Grid::Undistorted } else { Grid::Sensor };
-        options.normal_y = match self.normal_y {
-            NormalYName::Up => NormalY::Up,
-            NormalYName::Down => NormalY::Down,
-        };
+    /// Those of the file, with what the command line says over them.
+    fn settings(&self) -> Result<Settings, FileError> {
+        let kept = self.settings.as_deref().map(Settings::read).transpose()?.unwrap_or_default();
+        Ok(Settings {
+            method: self.method.map_or(kept.method, Into::into),
+            undistort: self.undistort || kept.undistort,
+            normal_y: self.normal_y.map_or(kept.normal_y, Into::into),
+            device: self.device.map_or(kept.device, Into::into),
+        })
+    }
+
+    fn options(&self) -> Result<Options, FileError> {
+        let mut options = self.settings()?.options(&self.session, &self.calibration, &self.out);
         options.mask = match &self.mask {
             None => MaskChoice::OfSession,
             Some(none) if none.as_os_str() == "none" => MaskChoice::Everything,
@@ -152,9 +171,8 @@ impl Args {
             _ => Scale::Full,
         };
         options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
-        options.device = self.device.into();
         options.threads = self.threads.map(usize::from);
-        options
+        Ok(options)
     }
 
     fn wants(&self, what: Wanted) -> bool {
@@ -163,11 +181,12 @@ impl Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Output, Failure> {
+    let options = args.options().map_err(Failure::work)?;
     let progress = Progress::new();
     let tell = |state: solve::Progress| progress.set(state.share(), state.stage.what());
     let page = |shown: &Shown| page_of_solve(shown, None);
     let page: Option<solve::Page> = args.wants(Wanted::Page).then_some(&page);
-    let solved = solve::run_with_page(&args.options(), &tell, page).map_err(Failure::work)?;
+    let solved = solve::run_with_page(&options, &tell, page).map_err(Failure::work)?;
     drop(progress);
     let report = solved.report;
     let up_to_date = if solved.up_to_date { "up to date, " } else { "" };

@@ -78,7 +78,6 @@ fn calls_are_understood_or_refused() {
     check("weavelight scan --rig r.toml", false);
     check("weavelight scan --out s", false);
     check("weavelight scan --rig r.toml --out s --thickness-mm -1", false);
-    check("weavelight scan --rig r.toml --out s --light 3", false);
     check("weavelight doctor", true);
     check("weavelight gui", true);
     check("weavelight fly", false);

@@ -36,6 +36,7 @@ mod rows;
 mod run;
 mod scene;
 mod sensor;
+mod settings;
 mod signal;
 mod swatch;
 #[cfg(test)]
@@ -57,4 +58,5 @@ pub use reduce::reduced_camera;
 pub use rows::Rows;
 pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};
+pub use settings::{DeviceName, MethodName, NormalYName, Settings};
 pub use swatch::{Swatch, find_swatch};

@@ -2,7 +2,7 @@
 
 use super::{Ask, Order};
 use crate::desk::Desk;
-use crate::settings::{MethodName, SolveSettings};
+use crate::settings::{MethodName, NormalYName, SolveSettings};
 use crate::worker::Command;
 use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui::{self, RichText};
@@ -166,7 +166,10 @@ fn solving(ui: &mut egui::Ui, settings: &mut SolveSettings) {
         ui.radio_value(&mut settings.method, method, name).on_hover_text(hint);
     }
     ui.checkbox(&mut settings.undistort, texts::UNDISTORT);
-    ui.checkbox(&mut settings.normal_y_down, texts::NORMAL_Y_DOWN);
+    let mut down = settings.normal_y == NormalYName::Down;
+    if ui.checkbox(&mut down, texts::NORMAL_Y_DOWN).changed() {
+        settings.normal_y = if down { NormalYName::Down } else { NormalYName::Up };
+    }
 }
 
 fn next_name(name: &str) -> String {
