@@ -6,7 +6,9 @@ use crate::files::FileError;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{self, MaskChoice, Options, Outputs, Reuse, Scale, Settings, Shown};
+use crate::solve::{
+    self, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown,
+};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -57,6 +59,9 @@ pub(super) struct Args {
     /// Solve again even if nothing has changed
     #[arg(long)]
     force: bool,
+    /// Write what the fit leaves over of each light too, residual-LL.exr: highlights positive, shadows negative
+    #[arg(long)]
+    residuals: bool,
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -171,6 +176,7 @@ impl Args {
             _ => Scale::Full,
         };
         options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
+        options.residuals = if self.residuals { Residuals::Write } else { Residuals::Leave };
         options.threads = self.threads.map(usize::from);
         Ok(options)
     }

@@ -61,18 +61,9 @@ pub fn encode_exr(
     names: &[&str],
     fill: impl Fn(usize, usize, &mut [f32]),
 ) -> std::io::Result<()> {
-    let too_large = |_| {
-        std::io::Error::new(std::io::ErrorKind::InvalidInput, "the picture is too large for EXR")
-    };
-    let row_bytes = i32::try_from(width * names.len() * 4).map_err(too_large)?;
-    i32::try_from(height).map_err(too_large)?;
-    // The format wants channels in the order of their names.
-    let mut order: Vec<usize> = (0..names.len()).collect();
-    order.sort_by_key(|&channel| names[channel]);
-    let mut buffer = header([width, height], order.iter().map(|&channel| names[channel]));
-    let first = buffer.len() + 8 * height;
-    let chunk = 8 + row_bytes as usize;
-    (0..height).for_each(|y| buffer.extend(((first + y * chunk) as u64).to_le_bytes()));
+    let mut buffer = preamble([width, height], names)?;
+    let order = in_order(names);
+    let row_bytes = (width * names.len() * 4) as i32;
     let mut row = vec![0.0; width];
     for y in 0..height {
         buffer.extend((y as i32).to_le_bytes());
@@ -88,6 +79,28 @@ pub fn encode_exr(
     }
     out.write_all(&buffer)?;
     out.flush()
+}
+
+/// The format wants channels in the order of their names.
+fn in_order(names: &[&str]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    order.sort_by_key(|&channel| names[channel]);
+    order
+}
+
+/// Everything before the rows: header and table of the rows' places.
+pub(super) fn preamble([width, height]: [usize; 2], names: &[&str]) -> std::io::Result<Vec<u8>> {
+    let too_large = |_| {
+        std::io::Error::new(std::io::ErrorKind::InvalidInput, "the picture is too large for EXR")
+    };
+    let row_bytes = i32::try_from(width * names.len() * 4).map_err(too_large)?;
+    i32::try_from(height).map_err(too_large)?;
+    let order = in_order(names);
+    let mut buffer = header([width, height], order.iter().map(|&channel| names[channel]));
+    let first = buffer.len() + 8 * height;
+    let chunk = 8 + row_bytes as usize;
+    (0..height).for_each(|y| buffer.extend(((first + y * chunk) as u64).to_le_bytes()));
+    Ok(buffer)
 }
 
 /// Magic number, version and the attributes that every file must have.

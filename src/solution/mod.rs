@@ -2,7 +2,7 @@
 
 mod report;
 
-pub use report::{DeviceReport, PlaneReport, Report};
+pub use report::{DeviceReport, PlaneReport, Report, ResidualFile};
 
 use crate::files::{FileError, OutputKind};
 use std::path::{Path, PathBuf};
@@ -19,6 +19,8 @@ pub const NORMAL_PNG: &str = "normal.png";
 pub const ALBEDO_PNG: &str = "albedo.png";
 /// 255 = solved.
 pub const MASK_PNG: &str = "mask.png";
+/// Start of the names of the files that hold what the fit leaves over of each light, on request; see [`residual_exr`].
+const RESIDUAL: &str = "residual-";
 /// What the solve says of itself.
 pub const REPORT_JSON: &str = "report.json";
 /// The page that a person looks at.
@@ -40,8 +42,16 @@ pub const OUTPUT: OutputKind = OutputKind {
         REPORT_JSON,
         REPORT_HTML,
         CAMERA_TOML,
+        "residual-*",
     ],
 };
+
+/// Name of the file with what the fit leaves over of a light: channel Y, 32-bit float, in units of the albedo, as a fraction
+/// of what a perfect white diffuser facing the light sends back; highlights positive, cast shadows negative; 0 where
+/// unsolved or clipped. Of a mosaic, under each photosite's own filter.
+pub fn residual_exr(light: usize) -> String {
+    format!("{RESIDUAL}{light:02}.exr")
+}
 
 /// A solution on disk.
 #[derive(Clone, Debug)]

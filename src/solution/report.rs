@@ -51,6 +51,9 @@ pub struct Report {
     /// What was found of the swatch, where the solve was to find it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swatch: Option<String>,
+    /// What the fit leaves over of each light, where it was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub residuals: Vec<ResidualFile>,
     /// Sentences; the same go to standard error.
     pub warnings: Vec<String>,
     /// The capture session's manifest and the calibration's files, with their hashes.
@@ -109,6 +112,15 @@ impl DeviceReport {
 
 fn full_resolution() -> usize {
     1
+}
+
+/// A light's residuals in `report.json`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResidualFile {
+    /// Its number in the rig.
+    pub light: usize,
+    /// The file, in the solution's folder.
+    pub file: String,
 }
 
 /// A plane in `report.json`.
@@ -193,6 +205,7 @@ mod tests {
             undistorted: false,
             plane: PlaneReport { point_mm: [0.0, 0.0, 5.0], normal: [0.0, 0.0, 1.0] },
             color_space: "linear sRGB".into(),
+            residuals: vec![ResidualFile { light: 3, file: "residual-03.exr".into() }],
             warnings: vec!["light 1 has no frame".into()],
             inputs: vec![Input { name: "session.toml".into(), sha256: "ab".into() }],
             device: Some(DeviceReport::processor("asked for".into())),

@@ -5,6 +5,7 @@ use super::field::{FieldRows, LightField};
 use super::maps::{Albedo, Counts, Maps};
 use super::noise::{AmbientNoise, LinearNoise, exposure_variances, merged_variance};
 use super::on_gpu::{OnGpu, TileRows};
+use super::residual::{ResidualRows, residual_row};
 use super::scene::Scene;
 use super::signal::{Normalizer, SignalRows};
 use crate::photometry::{
@@ -33,6 +34,8 @@ pub(crate) struct Run<'a> {
     several_exposures: bool,
     /// Per row parity and light: variance at even and odd columns with every exposure used.
     pub(super) variance: [Vec<[VarianceModel; 2]>; 2],
+    /// Who wants what the fit leaves over.
+    pub(super) residuals: Option<ResidualRows<'a>>,
 }
 
 /// Mutable parts of the maps that one band owns.
@@ -54,6 +57,8 @@ pub(super) struct Worker {
     kept: Vec<u64>,
     /// The tile under way, and the one being prepared.
     pub(super) tiles: [TileRows; 2],
+    /// What the fit leaves over of one light, as wide as the frame.
+    of_light: Vec<f32>,
 }
 
 /// A row as the kernels want it.
@@ -92,6 +97,7 @@ impl<'a> Run<'a> {
             weights,
             exposure_variance,
             variance,
+            residuals: None,
         }
     }
 
@@ -194,6 +200,7 @@ impl<'a> Run<'a> {
                 });
             } else {
                 counts.outcomes[Outcome::Masked as usize] += width;
+                self.no_residuals(worker, y);
             }
             done(1);
         }
@@ -233,7 +240,7 @@ impl<'a> Run<'a> {
         counts: &mut Counts,
         kernel: impl FnOnce(&mut RowSolver, &RowInput, &mut RowOutput) -> Result<(), RowError>,
     ) {
-        let Worker { solver, residual, kept, .. } = worker;
+        let Worker { solver, residual, kept, of_light, .. } = worker;
         let inside = self.inside(y, &columns);
         residual.resize(columns.len(), 0.0);
         kept.resize(columns.len(), 0);
@@ -268,9 +275,26 @@ impl<'a> Run<'a> {
                 rows.saturated[column] = false;
             });
         }
+        if let Some(hand_out) = self.residuals {
+            of_light.clear();
+            of_light.resize(self.scene.width, 0.0);
+            for (light, signal) in rows.signals().iter().enumerate() {
+                let inside = &mut of_light[columns.clone()];
+                residual_row(light, signal, &field, &output, inside);
+                hand_out(light, y, of_light);
+            }
+        }
         counts.add_row(output.outcome, output.residual);
         counts.outcomes[Outcome::Masked as usize] += self.scene.width - columns.len();
         counts.saturated += rows.saturated.iter().filter(|&&saturated| saturated).count();
+    }
+
+    /// Hands out a row that is wholly outside the mask.
+    pub(super) fn no_residuals(&self, worker: &mut Worker, y: usize) {
+        let Some(hand_out) = self.residuals else { return };
+        worker.of_light.clear();
+        worker.of_light.resize(self.scene.width, 0.0);
+        (0..self.scene.lights.len()).for_each(|light| hand_out(light, y, &worker.of_light));
     }
 
     fn mark_defects(&self, y: usize, columns: Range<usize>, outcome: &mut [Outcome]) {

@@ -1,11 +1,11 @@
 //! What is up to date is not made again: a solution remembers the hash of everything it was made from.
 
 use super::encode::map_files;
-use super::{Device, MaskChoice, Options, SolveError};
+use super::{Device, MaskChoice, Options, Residuals, SolveError};
 use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE};
 use crate::session::Session;
-use crate::solution::{self, REPORT_JSON, Report};
+use crate::solution::{self, REPORT_JSON, Report, ResidualFile};
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,9 @@ pub(crate) fn key(
     // Who solves without being named must not matter; one that is asked for by name is to be asked.
     if matches!(options.device, Device::Gpu) {
         text.push_str(" gpu");
+    }
+    if options.residuals == Residuals::Write {
+        text.push_str(" residuals");
     }
     let unhashed = session.frames.iter().filter(|frame| frame.sha256.is_none());
     let mut files = vec![session.manifest_path()];
@@ -68,7 +71,8 @@ pub(crate) fn still_current(
     let there = |name: &&str| options.out.join(name).is_file();
     let page = with_page.then_some(solution::REPORT_HTML);
     let whole = map_files(options.outputs).iter().chain(&page).all(there);
-    let same = whole && report.key.as_deref() == Some(key);
+    let residual = |file: &ResidualFile| options.out.join(&file.file).is_file();
+    let same = whole && report.residuals.iter().all(residual) && report.key.as_deref() == Some(key);
     // Of a frame that was altered, reading it will tell.
     let unaltered =
         same && session.frames.par_iter().all(|frame| session.read_frame(frame).is_ok());

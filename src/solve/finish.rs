@@ -63,6 +63,34 @@ fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
         .for_each(|rgb| *rgb = (matrix * nalgebra::Vector3::from(*rgb)).into());
 }
 
+/// Resamples one value a pixel, 0 where there is none, as [`undistort`] does.
+pub(crate) fn undistort_values(values: &Image<f32>, camera: &Camera) -> Image<f32> {
+    let (width, height) = (values.width, values.height);
+    let projector = Projector::new(camera);
+    let known = values.data.par_iter().map(|value| if *value == 0.0 { 0 } else { 255 });
+    let known = Image { width, height, data: known.collect() };
+    let mut out = Image::filled(width, height, 0.0);
+    out.data.par_chunks_mut(width.max(1)).enumerate().for_each(|(v, row)| {
+        for (u, value) in row.iter_mut().enumerate() {
+            if let Some(taps) = taps_of_undistorted(&known, camera, &projector, [u, v]) {
+                *value = taps.mean_of(|at| [values.data[at], 0.0, 0.0])[0];
+            }
+        }
+    });
+    out
+}
+
+/// The pixels around the place that pixel (u, v) of the camera without distortion looks at.
+fn taps_of_undistorted(
+    mask: &Image<u8>,
+    camera: &Camera,
+    projector: &Projector,
+    [u, v]: [usize; 2],
+) -> Option<Taps> {
+    let undistorted = [(u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy];
+    projector.pixel_of_undistorted(undistorted).and_then(|pixel| Taps::new(mask, pixel))
+}
+
 /// The same camera without its distortion.
 pub(crate) fn pinhole(camera: &Camera) -> Camera {
     Camera { distortion: [0.0; 5], ..camera.clone() }
@@ -87,12 +115,9 @@ pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
     let rows = rows.zip(confidence.data.par_chunks_mut(width)).zip(mask.data.par_chunks_mut(width));
     rows.enumerate().for_each(|(v, (((normal, albedo), confidence), mask))| {
         for u in 0..width {
-            let undistorted =
-                [(u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy];
-            let taps = projector
-                .pixel_of_undistorted(undistorted)
-                .and_then(|pixel| Taps::new(&maps.mask, pixel));
-            let Some(taps) = taps else { continue };
+            let Some(taps) = taps_of_undistorted(&maps.mask, camera, &projector, [u, v]) else {
+                continue;
+            };
             let mean_normal = nalgebra::Vector3::from(taps.mean(&maps.normal));
             let length = mean_normal.norm();
             if length > 0.0 {

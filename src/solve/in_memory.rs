@@ -11,6 +11,7 @@ use super::maps::Maps;
 use super::noise::{LinearNoise, full_scale};
 use super::on_gpu::{OnGpu, report_of};
 use super::progress::{Progress, Stage};
+use super::residual::ResidualRows;
 use super::scene::Scene;
 use super::witness::question;
 use crate::instrument::{CAMERA_FILE, Noise};
@@ -58,11 +59,37 @@ pub fn solve_scene_on(
     device: &Device,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<SolvedScene, SolveError> {
+    solve(scene, method, device, None, progress)
+}
+
+/// [`solve_scene_on`] that also hands out what the fit leaves over of every light, row by row as it is found.
+///
+/// # Errors
+/// As [`solve_scene_on`].
+pub fn solve_scene_with_residuals(
+    scene: &Scene,
+    method: Method,
+    device: &Device,
+    residuals: ResidualRows,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<SolvedScene, SolveError> {
+    solve(scene, method, device, Some(residuals), progress)
+}
+
+fn solve(
+    scene: &Scene,
+    method: Method,
+    device: &Device,
+    residuals: Option<ResidualRows>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<SolvedScene, SolveError> {
     check_frames(scene)?;
     let field = light_field(scene)?;
     let mut warnings = check_light_field(scene, &field)?;
-    let run = Run::new(scene, &field, noise(scene, &field), method);
+    let mut run = Run::new(scene, &field, noise(scene, &field), method);
     let Chosen { gpu, why } = choose(&run, device)?;
+    // Only now: choosing may solve some rows to see who is faster.
+    run.residuals = residuals;
     if gpu.is_none() && matches!(device, Device::Gpu | Device::Opened(_)) {
         warnings.push(format!("No graphics processor took part: {why}."));
     }

@@ -32,6 +32,7 @@ mod reduce;
 #[cfg(test)]
 mod reference;
 mod region;
+mod residual;
 mod rows;
 mod run;
 mod scene;
@@ -46,15 +47,19 @@ mod witness;
 pub use device::Device;
 pub use error::SolveError;
 pub use finish::Finished;
-pub use in_memory::{SolvedScene, leave_out_what_adds_nothing, solve_scene, solve_scene_on};
+pub use in_memory::{
+    SolvedScene, leave_out_what_adds_nothing, solve_scene, solve_scene_on,
+    solve_scene_with_residuals,
+};
 pub use load::load_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 pub use mask_file::{MASK_FILE, MaskMade, MaskOptions, make_mask};
-pub use options::{Grid, MaskChoice, NormalY, Options, Outputs, Reuse};
+pub use options::{Grid, MaskChoice, NormalY, Options, Outputs, Residuals, Reuse};
 pub use preview::Scale;
 pub use progress::{Progress, Stage};
 pub use progressive::{Level, progressively};
 pub use reduce::reduced_camera;
+pub use residual::ResidualRows;
 pub use rows::Rows;
 pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};

@@ -204,6 +204,7 @@ impl Run<'_> {
         for row in &mut tile.rows[..tile.used] {
             if row.columns.is_empty() {
                 counts.outcomes[Outcome::Masked as usize] += self.scene.width;
+                self.no_residuals(worker, row.y);
                 continue;
             }
             let Prepared { y, columns, signal, vectors, step, lights, cut } = row;

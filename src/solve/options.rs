@@ -30,6 +30,18 @@ pub struct Options {
     pub device: Device,
     /// Whether a solution that is up to date is made again.
     pub reuse: Reuse,
+    /// Whether what the fit leaves over of each light is written too.
+    pub residuals: Residuals,
+}
+
+/// What becomes of what the fit leaves over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Residuals {
+    /// It is not even computed.
+    #[default]
+    Leave,
+    /// One file a light, see [`residual_exr`](crate::solution::residual_exr).
+    Write,
 }
 
 /// Where the swatch is: the table around it is not solved.
@@ -117,6 +129,7 @@ impl Options {
             threads: None,
             device: Device::Cpu,
             reuse: Reuse::IfCurrent,
+            residuals: Residuals::Leave,
         }
     }
 }

@@ -24,7 +24,13 @@ pub(crate) fn solve_exactly(run: &Run, x: usize, y: usize) -> Option<Pixel> {
 }
 
 /// Normalised signal of one light, and its variance.
-fn signal(run: &Run, light: usize, x: usize, y: usize, place: usize) -> (f64, VarianceModel) {
+pub(crate) fn signal(
+    run: &Run,
+    light: usize,
+    x: usize,
+    y: usize,
+    place: usize,
+) -> (f64, VarianceModel) {
     let scene = run.scene();
     let channels = scene.layout.channels();
     let exposures = &scene.lights[light].exposures;

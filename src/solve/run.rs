@@ -4,12 +4,15 @@ use super::SolveError;
 use super::current::{key, still_current};
 use super::encode::write_maps;
 use super::finish::{Finished, color_space, finish, pinhole, undistort};
-use super::in_memory::{SolvedScene, leave_out_what_adds_nothing, solve_scene_on};
+use super::in_memory::{
+    SolvedScene, leave_out_what_adds_nothing, solve_scene_on, solve_scene_with_residuals,
+};
 use super::load::{Loaded, load};
 use super::maps::Counts;
-use super::options::{Grid, MaskChoice, Options, Outputs, Reuse};
+use super::options::{Grid, MaskChoice, Options, Outputs, Residuals, Reuse};
 use super::preview::Scale;
 use super::progress::{Progress, Stage};
+use super::residual::ResidualFiles;
 use super::scene::{Exposure, Scene};
 use super::swatch::find_swatch;
 use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
@@ -133,12 +136,14 @@ fn make(
     if options.scale != Scale::Full {
         scene = scene.reduced(options.scale);
     }
-    let SolvedScene { maps, warnings: of_solve, device } =
-        solve_scene_on(&scene, options.method, &options.device, progress)?;
+    let (solved, residuals) = solve_into(&staged, &scene, options, progress)?;
+    let SolvedScene { maps, warnings: of_solve, device } = solved;
     warnings.extend(of_solve);
     watch.lap(Stage::Solve);
     let frames = if page.is_some() { previews(&scene) } else { Vec::new() };
     let rest = Rest::of(scene);
+    let undistorted = rest.camera.as_ref().filter(|_| options.grid == Grid::Undistorted);
+    let residuals = residuals.map(|files| files.finish(undistorted)).transpose()?;
     let counts = maps.counts;
     let shown = page.is_some();
     let wanted = Outputs { albedo: options.outputs.albedo || shown, ..options.outputs };
@@ -148,6 +153,7 @@ fn make(
     copy_camera(&rest, options, staged.path())?;
     watch.lap(Stage::Write);
     let mut report = report(options, &rest, &finished, counts);
+    report.residuals = residuals.unwrap_or_default();
     report.warnings = warnings;
     report.device = Some(device);
     report.inputs = made_from.inputs;
@@ -164,6 +170,24 @@ fn make(
     report.write(&staged.join(REPORT_JSON))?;
     staged.commit()?;
     Ok(report)
+}
+
+/// Solves; residuals, where asked for, go to their files meanwhile.
+fn solve_into(
+    staged: &StagedFolder,
+    scene: &Scene,
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<(SolvedScene, Option<ResidualFiles>), SolveError> {
+    let (method, device) = (options.method, &options.device);
+    if options.residuals == Residuals::Leave {
+        return Ok((solve_scene_on(scene, method, device, progress)?, None));
+    }
+    let lights = scene.lights.iter().map(|light| light.index).collect();
+    let files = ResidualFiles::create(staged.path(), lights, [scene.width, scene.height])?;
+    let write = |light: usize, y: usize, values: &[f32]| files.write_row(light, y, values);
+    let solved = solve_scene_with_residuals(scene, method, device, &write, progress)?;
+    Ok((solved, Some(files)))
 }
 
 /// Longest side of the frames on a page, pixels.
@@ -272,6 +296,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
             normal: rest.plane.normal.into_inner().into(),
         },
         color_space: color_space(&rest.color).to_owned(),
+        residuals: vec![],
         warnings: vec![],
         inputs: vec![],
         device: None,

@@ -336,3 +336,39 @@ fn what_is_up_to_date_is_not_made_again() {
     std::fs::write(folders.session.frame_path(&folders.session.frames[0]), b"altered").unwrap();
     assert!(run(&robust, &|_| {}).unwrap_err().to_string().contains("altered"));
 }
+
+#[test]
+fn residuals_are_written_where_they_are_asked_for() {
+    let mut made = scene(Recipe { lights: 4, width: 40, height: 30, ..Recipe::default() });
+    // A photosite that clips has no residual.
+    if let Samples::U16(samples) = &mut made.lights[1].exposures[0].frame.samples {
+        samples[15 * 40 + 20] = u16::MAX;
+    }
+    let folders = Folders::of(&made);
+    let plain = folders.run(&folders.options());
+    assert!(!plain.keys().any(|name| name.starts_with("residual")), "{:?}", names(&plain));
+    let mut asked = Options { residuals: Residuals::Write, ..folders.options() };
+    let files = folders.run(&asked);
+    let expected: Vec<String> = (0..4).map(solution::residual_exr).collect();
+    let found: Vec<&String> = files.keys().filter(|name| !plain.contains_key(*name)).collect();
+    assert_eq!(found, expected.iter().collect::<Vec<_>>());
+    assert!(plain.iter().all(|(name, bytes)| files[name] == *bytes), "the maps stay as they are");
+    let report = solution::Report::read(&asked.out.join(solution::REPORT_JSON)).unwrap();
+    let listed: Vec<&String> = report.residuals.iter().map(|residual| &residual.file).collect();
+    assert_eq!(listed, expected.iter().collect::<Vec<_>>());
+    let value = |light: usize, at: usize| {
+        let path = asked.out.join(solution::residual_exr(light));
+        crate::raster::read_exr(&path).unwrap().channel("Y").unwrap()[at]
+    };
+    assert_eq!(value(1, 15 * 40 + 20), 0.0);
+    assert!(value(0, 15 * 40 + 20) != 0.0 && value(1, 15 * 40 + 21) != 0.0);
+    // Threads, reuse, the other grid.
+    assert!(folders.run(&Options { threads: Some(1), ..asked.clone() }) == files);
+    asked.reuse = Reuse::IfCurrent;
+    assert!(run(&asked, &|_| {}).unwrap().up_to_date);
+    std::fs::remove_file(asked.out.join("residual-02.exr")).unwrap();
+    assert!(!run(&asked, &|_| {}).unwrap().up_to_date);
+    let undistorted = folders.run(&Options { grid: Grid::Undistorted, ..asked.clone() });
+    assert!(undistorted["residual-00.exr"] != files["residual-00.exr"]);
+    assert_eq!(undistorted["residual-00.exr"].len(), files["residual-00.exr"].len());
+}

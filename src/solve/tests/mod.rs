@@ -4,6 +4,7 @@ mod gpu;
 mod idle;
 mod previews;
 mod reduced;
+mod residuals;
 mod scenes;
 
 use super::bands::Run;
