@@ -4,11 +4,10 @@
 use pulp::{Simd, WithSimd};
 
 use super::block::{Block, LANES, Lanes, ZERO};
-use super::method::{RELATIVE_FLOOR, chi_square_limit};
+use super::method::{RELATIVE_FLOOR, WEIGHTED_CONDITION_SQUARED, chi_square_limit};
 use super::pieces::{Linear, Piece, Pieces};
 use super::row::RowInput;
 use super::surface::Surface;
-use super::weighted::WEIGHTED_CONDITION_SQUARED;
 use super::wide::{Matrix, Vector, Wide};
 
 /// A placed block, its piece and its row.

@@ -4,8 +4,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::method::{
-    BEHIND_DEVIATIONS, BEHIND_LEVEL, COPLANAR_CONDITION, LIT_ABOVE_FLOOR, MAX_LIGHTS,
-    MOST_LENGTHENING, Method, RELATIVE_FLOOR, REWEIGHTINGS, START_LEVEL, START_SAMPLES,
+    BEHIND_DEVIATIONS, BEHIND_LEVEL, CLEAR_DEVIATIONS, COPLANAR_CONDITION, FEWEST_KEPT,
+    LIT_ABOVE_FLOOR, MAX_LIGHTS, MOST_LENGTHENING, Method, RELATIVE_FLOOR, REWEIGHTINGS,
+    START_LEVEL, START_SAMPLES, WEIGHTED_CONDITION_SQUARED,
 };
 use super::row::{Outcome, RowInput, RowOutput, VarianceModel};
 
@@ -62,6 +63,8 @@ pub(crate) struct Solution {
     /// (sum w l l^T)^-1.
     pub(crate) inverse: Matrix3<f64>,
     pub(crate) weights: [f64; MAX_LIGHTS],
+    /// The fit that albedo is taken from, where it is another one: g and its covariance.
+    pub(crate) clear: Option<(Vector3<f64>, Matrix3<f64>)>,
 }
 
 impl Solution {
@@ -132,7 +135,7 @@ impl Samples<'_> {
             }
         }
         let inverse = inverse_if_conditioned(&normal_matrix)?;
-        Some(Solution { g: inverse * right, inverse, weights })
+        Some(Solution { g: inverse * right, inverse, weights, clear: None })
     }
 
     /// Weighted solution; `plain` is the solution with every usable sample. Where all samples are there, noise explains the
@@ -152,7 +155,34 @@ impl Samples<'_> {
                 None => break,
             };
         }
-        solution
+        self.settle_albedo(solution)
+    }
+
+    /// Takes albedo from the lights clear of the horizon, see [`CLEAR_DEVIATIONS`].
+    pub(crate) fn settle_albedo(&self, solution: Solution) -> Solution {
+        let is_clear = |i: usize| {
+            let predicted = solution.g.dot(&self.lights[i]);
+            let floor = variance(&self.variance[i], 0.0, self.noise_scale);
+            predicted > 0.0 && predicted * predicted > CLEAR_DEVIATIONS.powi(2) * floor
+        };
+        let mut weights = solution.weights;
+        let (mut left, mut squares) = (0, 0.0);
+        for (i, light) in self.lights.iter().enumerate().filter(|&(i, _)| weights[i] > 0.0) {
+            if is_clear(i) {
+                left += 1;
+                squares += weights[i] * light.norm_squared();
+            }
+        }
+        (0..self.lights.len()).filter(|&i| !is_clear(i)).for_each(|i| weights[i] = 0.0);
+        if weights == solution.weights || left < FEWEST_KEPT {
+            return solution;
+        }
+        let carried = |clear: &Solution| {
+            squares * clear.inverse.trace() < f64::from(WEIGHTED_CONDITION_SQUARED)
+                && clear.g.norm() > 0.0
+        };
+        let clear = self.solve(weights).filter(carried).map(|clear| (clear.g, clear.inverse));
+        Solution { clear, ..solution }
     }
 
     /// The subset test; where none of its solves succeeds, the weighted solution stands.
@@ -247,9 +277,10 @@ impl Samples<'_> {
             return Pixel::NoSurface;
         }
         let normal = solution.g / length;
-        let across_normal = covariance.trace() - normal.dot(&(covariance * normal));
-        let expected_error = across_normal.max(0.0).sqrt() / length;
-        let albedo = length * (1.0 - (0.5 * expected_error.powi(2)).min(most_lengthening));
+        let expected_error = relative_deviation(&solution.g, &covariance);
+        let (g, covariance) = solution.clear.unwrap_or((solution.g, covariance));
+        let lengthening = 0.5 * relative_deviation(&g, &covariance).powi(2);
+        let albedo = g.norm() * (1.0 - lengthening.min(most_lengthening));
         let residual = self.residual(solution);
         Pixel::Fitted(Fit {
             normal,
@@ -282,6 +313,13 @@ impl Samples<'_> {
         }
         (squares / f64::max(count, 1.0)).sqrt()
     }
+}
+
+/// Standard deviation across a vector (both axes together) over its length.
+fn relative_deviation(g: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    let normal = g.normalize();
+    let across_normal = covariance.trace() - normal.dot(&(covariance * normal));
+    across_normal.max(0.0).sqrt() / g.norm()
 }
 
 /// var(y) at a predicted value; terms that are not finite or negative count as zero.

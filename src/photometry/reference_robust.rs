@@ -21,7 +21,7 @@ impl Samples<'_> {
         let first = self.search(&self.first_weights(usable))?;
         let g = self.reweighted(&first)?.g;
         let second = self.search(&self.weights_at(&g, usable, true))?;
-        let solution = self.reweighted(&second)?;
+        let solution = self.settle_albedo(self.reweighted(&second)?);
         let outcome = self.judge(&solution, &second);
         Some((solution, outcome))
     }

@@ -18,6 +18,8 @@ pub(crate) struct Surface {
     pub(crate) outcome: [Outcome; LANES],
     /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
     pub(crate) most_lengthening: f32,
+    /// Albedo of the lights clear of the horizon over that of all; see [`CLEAR_DEVIATIONS`](super::method::CLEAR_DEVIATIONS).
+    pub(crate) albedo_share: Lanes,
 }
 
 /// |g|^2 outside this range may have lost bits to underflow or overflow: float64 takes over.
@@ -44,6 +46,7 @@ impl Surface {
             carried,
             outcome,
             most_lengthening,
+            albedo_share: [1.0; LANES],
         }
     }
 
@@ -70,6 +73,20 @@ impl Surface {
         (normal, lengths)
     }
 
+    /// Standard deviation across the normal (both axes together) over the length of g, and that length without what noise adds
+    /// to it.
+    #[inline(always)]
+    pub(crate) fn deviation_and_true_length(&self, length: &Lanes) -> (Lanes, Lanes) {
+        let (mut deviation, mut true_length) = (ZERO, ZERO);
+        for k in 0..LANES {
+            let relative = self.tangent_variance[k].max(0.0).sqrt() / length[k];
+            let lengthening = (0.5 * relative * relative).min(self.most_lengthening);
+            deviation[k] = relative;
+            true_length[k] = length[k] * (1.0 - lengthening);
+        }
+        (deviation, true_length)
+    }
+
     /// Writes the block's photosites and hands the lanes that float32 cannot carry to `refused`.
     #[inline(always)]
     pub(crate) fn write(
@@ -82,11 +99,11 @@ impl Surface {
         let (normal, length) = self.normal_and_length();
         let (mut albedo, mut error_deg, mut residual) = (ZERO, ZERO, ZERO);
         let per_unit = (1.0 / unit) as f32;
+        let (relative, true_length) = self.deviation_and_true_length(&length);
         for k in 0..LANES {
-            let relative = self.tangent_variance[k].max(0.0).sqrt() / length[k];
-            let lengthening = (0.5 * relative * relative).min(self.most_lengthening);
-            albedo[k] = length[k] * (1.0 - lengthening) * per_unit;
-            error_deg[k] = (relative * (180.0 / std::f32::consts::PI)).min(MOST_ERROR_DEG as f32);
+            albedo[k] = true_length[k] * per_unit * self.albedo_share[k];
+            error_deg[k] =
+                (relative[k] * (180.0 / std::f32::consts::PI)).min(MOST_ERROR_DEG as f32);
             residual[k] = (self.squares[k].max(0.0) / self.count[k].max(1.0)).sqrt();
         }
         let mut good = [true; LANES];

@@ -3,12 +3,13 @@
 use multiversion::multiversion;
 
 use super::block::{Block, LANES, Lanes, ZERO};
-use super::method::{MOST_LENGTHENING, START_LEVEL, chi_square_limit};
-use super::normal_equations::{Weighting, accumulate, dot, improve, times};
+use super::least_squares::add;
+use super::method::{
+    CLEAR_DEVIATIONS, FEWEST_KEPT, MOST_LENGTHENING, START_LEVEL, WEIGHTED_CONDITION_SQUARED,
+    chi_square_limit,
+};
+use super::normal_equations::{Sums, Weighting, accumulate, dot, improve, predict, times};
 use super::surface::Surface;
-
-/// Normal equations only correct an earlier fit here, so a larger condition is carried than where they make it.
-pub(crate) const WEIGHTED_CONDITION_SQUARED: f32 = 1e4;
 
 /// A block's weighted solution and its chi-square.
 pub(crate) struct Weighted {
@@ -71,7 +72,42 @@ pub(crate) fn finish(
         }
     }
     covariance_across(&mut surface, inverse, condition_squared);
+    settle_albedo(block, &mut surface);
     Weighted { surface, chi_square, overlooked }
+}
+
+/// Takes albedo from the lights clear of the horizon, see [`CLEAR_DEVIATIONS`].
+#[inline(always)]
+fn settle_albedo(block: &Block, surface: &mut Surface) {
+    let (mut sums, mut left, mut dropped) = (Sums::none(), ZERO, ZERO);
+    for sample in &block.sample {
+        let predicted = predict(&sample.light, &surface.g);
+        let (mut weight, mut residual) = (ZERO, ZERO);
+        for k in 0..LANES {
+            let floor = sample.variance(k, 0.0) * (CLEAR_DEVIATIONS * CLEAR_DEVIATIONS) as f32;
+            let clear = (predicted[k] > 0.0) & (predicted[k] * predicted[k] > floor);
+            let used = sample.weight[k] > 0.0;
+            weight[k] = if clear { sample.weight[k] } else { 0.0 };
+            residual[k] = sample.y[k] - predicted[k];
+            left[k] += if used & clear { 1.0 } else { 0.0 };
+            dropped[k] += if used & !clear { 1.0 } else { 0.0 };
+        }
+        sums.add(&sample.light, &weight, &residual);
+    }
+    if dropped == ZERO {
+        return;
+    }
+    let (inverse, condition_squared) = sums.inverse();
+    let mut clear = Surface::new(surface.g, surface.most_lengthening.into());
+    add(&mut clear.g, &times(&inverse, &sums.right));
+    covariance_across(&mut clear, &inverse, &condition_squared);
+    let (_, of_clear) = clear.deviation_and_true_length(&clear.normal_and_length().1);
+    let (_, of_all) = surface.deviation_and_true_length(&surface.normal_and_length().1);
+    for k in 0..LANES {
+        let enough = (dropped[k] > 0.0) & (left[k] >= FEWEST_KEPT as f32) & clear.carried[k];
+        let share = of_clear[k] / of_all[k];
+        surface.albedo_share[k] = if enough & (share > 0.0) { share } else { 1.0 };
+    }
 }
 
 /// Notes the covariance across the normal, and whether float32 carries the lights' condition.
