@@ -27,13 +27,18 @@ pub(crate) fn residual_row(
     surface: &RowOutput,
     residual: &mut [f32],
 ) {
-    for (column, residual) in residual.iter_mut().enumerate() {
-        let vector = field.at(column, light);
-        let normal = Vector3::from(surface.normal[column]).cast::<f64>();
-        let predicted = f64::from(surface.albedo[column]) * normal.dot(&vector).max(0.0);
-        let value = ((f64::from(signal[column]) - predicted) / vector.norm()) as f32;
-        let known = is_solved(surface.outcome[column]) && value.is_finite();
-        *residual = if known { value } else { 0.0 };
+    let step = field.step.max(1);
+    for (node, between) in residual.chunks_mut(step).enumerate() {
+        let start = field.at(node * step, light);
+        let per_column = (field.at((node + 1) * step, light) - start) / step as f64;
+        for (k, residual) in between.iter_mut().enumerate() {
+            let (column, vector) = (node * step + k, start + per_column * k as f64);
+            let normal = Vector3::from(surface.normal[column]).cast::<f64>();
+            let predicted = f64::from(surface.albedo[column]) * normal.dot(&vector).max(0.0);
+            let value = ((f64::from(signal[column]) - predicted) / vector.norm()) as f32;
+            let known = is_solved(surface.outcome[column]) && value.is_finite();
+            *residual = if known { value } else { 0.0 };
+        }
     }
 }
 
