@@ -10,8 +10,11 @@ const MOST_BYTES: usize = 256 << 20;
 /// A subject and the light that each of the stage's lights throws on it, kept from the first picture on where that fits.
 pub(super) struct Remembered {
     subject: Box<dyn Subject + Send>,
-    tiles: Option<Mutex<HashMap<(usize, usize), Arc<Signals>>>>,
+    tiles: Option<Mutex<Tiles>>,
 }
+
+/// By the place of the tile's corner.
+type Tiles = HashMap<(usize, usize), Arc<Signals>>;
 
 impl Remembered {
     /// Nothing has been seen yet. `stage` is the one that all pictures are taken on.
