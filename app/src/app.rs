@@ -85,6 +85,7 @@ impl App {
                 self.scan.reset(desk);
                 self.scans.reset(desk);
                 self.rig.reset(desk);
+                self.calibrate.reset();
             }
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),

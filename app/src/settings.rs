@@ -25,6 +25,8 @@ pub struct Settings {
     pub room: crate::rooms::Room,
     /// How scans are solved.
     pub solve: SolveSettings,
+    /// The calibration targets in use.
+    pub targets: crate::rooms::calibrate::TargetSettings,
     /// Where these settings are kept; not part of the file.
     #[serde(skip)]
     file: Option<PathBuf>,
@@ -54,6 +56,7 @@ impl Default for Settings {
             window_size: [1280.0, 800.0],
             room: crate::rooms::Room::Scan,
             solve: SolveSettings::default(),
+            targets: Default::default(),
             file: None,
         }
     }

@@ -1,5 +1,7 @@
 //! Every word that the window says, by room; what goes wrong is told in the library's own words.
 
+pub mod calibrate;
+
 /// The window's title.
 pub const TITLE: &str = "Weavelight";
 /// Where the program itself is at fault.

@@ -1,6 +1,7 @@
 //! The window's rooms, drawn and used: the real worker, the real library, the simulated board and camera.
 
 mod desk;
+mod wizard;
 
 use desk::{Window, both_themes};
 use eframe::egui;

@@ -14,7 +14,7 @@ pub fn with_instruments<T, E: std::fmt::Display>(
     tools: &mut Tools,
     work: impl FnOnce(&Place, &mut Instruments) -> Result<T, E>,
 ) -> Result<T, String> {
-    let Tools { place, instruments } = tools;
+    let Tools { place, instruments, .. } = tools;
     let place = place.as_ref().ok_or(texts::NONE_OPEN)?;
     let opened = instruments.take().map_or_else(|| open(&place.rig, &place.rig_file()), Ok);
     let mut opened = opened.map_err(|error| error.to_string())?;

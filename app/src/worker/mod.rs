@@ -82,6 +82,8 @@ pub struct Tools {
     pub place: Option<Place>,
     /// Its board and camera, opened when first needed and closed with the rig or when they fail.
     pub instruments: Option<Instruments>,
+    /// What was seen in pictures of targets.
+    pub calibrate: calibrate::Memory,
 }
 
 /// The worker as the window sees it.

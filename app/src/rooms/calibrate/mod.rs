@@ -1,0 +1,226 @@
+//! The Calibrate room, a wizard: one thing to do at a time, what the camera sees with what was found drawn over it, how good it
+//! is so far, and what comes next.
+
+mod figures;
+mod history;
+mod picture;
+mod task;
+mod view;
+mod work;
+
+pub use picture::{Marks, Picture};
+pub use task::{BOARDS, Pose, State, Step, TargetSettings, Task};
+pub use work::Memory;
+
+use crate::desk::{Brake, Desk};
+use crate::texts::calibrate as texts;
+use crate::theme;
+use crate::worker::{Command, Outbox, Tools};
+use eframe::egui;
+use weavelight::calibrate::{CameraReport, CheckReport, ColorReport, LightsReport};
+
+/// What this room asks of the worker.
+#[derive(Debug)]
+pub enum Ask {
+    /// What is there.
+    Refresh,
+    /// The pictures of a task.
+    Take(Task, TargetSettings),
+    /// A test shot of what lies there, with what is found in it; nothing is kept.
+    Look(Task, TargetSettings),
+    /// The fit of a step.
+    Fit(Step),
+    /// The pictures of a step into the history; the calibration stays until the new one is made.
+    Again(Step),
+    /// Everything into the history, and from the beginning.
+    Anew,
+    /// An earlier calibration back.
+    Restore(String),
+}
+
+/// What came of a fit.
+#[derive(Debug)]
+pub enum Report {
+    /// Of the camera.
+    Camera(Box<CameraReport>),
+    /// Of levels and colour.
+    Color(Box<ColorReport>),
+    /// Of the lights.
+    Lights(Box<LightsReport>),
+    /// Of the sheet that the fit has not seen.
+    Check(Box<CheckReport>),
+}
+
+/// What the worker tells this room.
+#[derive(Debug)]
+pub enum Told {
+    /// What is there.
+    State(Box<State>),
+    /// What the camera saw.
+    Picture(Box<Picture>),
+    /// What came of a fit.
+    Report(Report),
+    /// Something failed or was stopped: nothing goes on by itself.
+    Halted,
+}
+
+/// What this room keeps.
+#[derive(Debug, Default)]
+pub struct Calibrate {
+    state: Option<Box<State>>,
+    asked: bool,
+    /// Go on by itself, on the simulated rig.
+    auto: bool,
+    view: view::View,
+    /// What came of camera, colour, lights and check.
+    figures: [Option<String>; 4],
+}
+
+impl Calibrate {
+    /// Draws the room.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if !self.asked {
+            self.asked = true;
+            desk.ask(Command::Calibrate(Ask::Refresh));
+        }
+        let pane = egui::Panel::left("calibration steps").exact_size(292.0).resizable(false);
+        pane.show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
+        });
+        let task = self.state.as_ref().map(|state| state.next());
+        if task.and_then(Task::step) == Some(Step::Camera) {
+            let coverage = egui::Panel::bottom("coverage").exact_size(view::COVERAGE_HEIGHT);
+            coverage.show(ui, |ui| {
+                if let Some(state) = &self.state {
+                    view::coverage(ui, state);
+                }
+            });
+        }
+        egui::CentralPanel::default().show(ui, |ui| {
+            if let Some(task) = task {
+                self.task(ui, task, desk);
+                let corners = self.state.as_ref().filter(|_| task == Task::Board);
+                self.view.ui(ui, corners.map_or(&[], |state| &state.corners_px));
+            }
+        });
+    }
+
+    fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.heading(crate::texts::rooms::CALIBRATE);
+        let Some(state) = &self.state else { return };
+        let now = state.next().step();
+        for step in Step::ALL {
+            let again = view::step(ui, state, step, now, self.figures[step as usize].as_deref());
+            if again && !desk.is_busy() {
+                desk.ask(Command::Calibrate(Ask::Again(step)));
+            }
+        }
+        ui.separator();
+        view::age(ui, state, &mut desk.settings.targets);
+        let anything = state.begun || state.age_days.is_some();
+        let anew = egui::Button::new(texts::ANEW);
+        let free = !desk.is_busy() && anything;
+        if ui.add_enabled(free, anew).on_hover_text(texts::ANEW_HINT).clicked() {
+            desk.ask(Command::Calibrate(Ask::Anew));
+        }
+        ui.separator();
+        if let Some(entry) = view::history(ui, state, !desk.is_busy()) {
+            desk.ask(Command::Calibrate(Ask::Restore(entry)));
+        }
+    }
+
+    /// What to do now, and the button that does it.
+    fn task(&mut self, ui: &mut egui::Ui, task: Task, desk: &mut Desk) {
+        let Some(state) = &self.state else { return };
+        let simulated = desk.place.as_ref().is_some_and(view::lays_by_itself);
+        view::instructions(ui, task, state, simulated);
+        if task == Task::Done {
+            view::verdict(ui, state);
+            return;
+        }
+        let needs_opencv = task.step() == Some(Step::Camera) || !simulated;
+        if needs_opencv && !cfg!(feature = "opencv") && task.step() == Some(Step::Camera) {
+            view::no_chessboards(ui);
+            return;
+        }
+        if !simulated {
+            view::targets(ui, task, &mut desk.settings.targets, desk.place.as_ref());
+        }
+        self.buttons(ui, task, simulated, desk);
+        ui.add_space(theme::GAP);
+    }
+
+    fn buttons(&mut self, ui: &mut egui::Ui, task: Task, simulated: bool, desk: &mut Desk) {
+        let busy = desk.is_busy();
+        let is_fit = matches!(task, Task::Fit(_));
+        ui.horizontal(|ui| {
+            let text = if is_fit { texts::FIT } else { texts::TAKE };
+            let size = egui::vec2(220.0, theme::BIG);
+            let clicked = crate::widgets::primary(ui, text, size, !busy).clicked();
+            let free = !ui.ctx().egui_wants_keyboard_input();
+            let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
+            if (clicked || space) && !busy {
+                self.go(task, desk);
+            }
+            let small = egui::vec2(0.0, theme::BIG);
+            if !is_fit {
+                let look = egui::Button::new(texts::LOOK).min_size(small);
+                if ui.add_enabled(!busy, look).on_hover_text(texts::LOOK_HINT).clicked() {
+                    let targets = desk.settings.targets.clone();
+                    desk.ask(Command::Calibrate(Ask::Look(task, targets)));
+                }
+            }
+            if simulated && !self.auto {
+                let auto = egui::Button::new(texts::AUTO).min_size(small);
+                if ui.add_enabled(!busy, auto).on_hover_text(texts::AUTO_HINT).clicked() {
+                    self.auto = true;
+                    self.go(task, desk);
+                }
+            }
+            if self.auto && ui.add(egui::Button::new(texts::STOP).min_size(small)).clicked() {
+                self.auto = false;
+                desk.brake(Brake::Cancel);
+            }
+        });
+    }
+
+    fn go(&mut self, task: Task, desk: &mut Desk) {
+        let ask = match task {
+            Task::Done => return,
+            Task::Fit(step) => Ask::Fit(step),
+            task => Ask::Take(task, desk.settings.targets.clone()),
+        };
+        desk.ask(Command::Calibrate(ask));
+    }
+
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
+        match told {
+            Told::State(state) => {
+                let task = state.next();
+                self.state = Some(state);
+                match (self.auto, task) {
+                    (true, Task::Done | Task::Fit(_)) => self.auto = false,
+                    (true, task) => self.go(task, desk),
+                    (false, _) => {}
+                }
+            }
+            Told::Picture(picture) => self.view.show(*picture),
+            Told::Report(report) => {
+                let (step, text) = figures::text(&report);
+                self.figures[step as usize] = Some(text);
+            }
+            Told::Halted => self.auto = false,
+        }
+    }
+
+    /// Another rig, or something may have changed.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// The worker's part.
+pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    work::act(ask, tools, out);
+}

@@ -1,0 +1,286 @@
+//! What is to be done next, as a function of what is there.
+
+use serde::{Deserialize, Serialize};
+use weavelight::calibrate::{BoardsSoFar, Status, StepState};
+
+/// The wizard's steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Lens, sensor and table from a chessboard.
+    Camera,
+    /// Levels and colour from a chart.
+    Color,
+    /// Places and strengths of the lights from white sheets.
+    Lights,
+    /// A sheet that the fit has not seen.
+    Check,
+}
+
+impl Step {
+    /// In the order of the work.
+    pub const ALL: [Step; 4] = [Step::Camera, Step::Color, Step::Lights, Step::Check];
+}
+
+/// How a white sheet lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pose {
+    /// On the table.
+    Flat,
+    /// Level, on blocks.
+    Raised,
+    /// Propped up: towards the upper right, upper left, lower left, lower right.
+    Tilt(usize),
+    /// Propped up another way, for the check.
+    Check,
+}
+
+impl Pose {
+    /// Those that the lights are calibrated with.
+    pub const FIT: [Pose; 6] =
+        [Pose::Flat, Pose::Raised, Pose::Tilt(0), Pose::Tilt(1), Pose::Tilt(2), Pose::Tilt(3)];
+
+    /// The capture session's folder.
+    pub fn folder(self) -> String {
+        match self {
+            Pose::Flat => "white-flat".to_owned(),
+            Pose::Raised => "white-raised".to_owned(),
+            Pose::Tilt(k) => format!("white-tilt-{}", k + 1),
+            Pose::Check => "check-tilt".to_owned(),
+        }
+    }
+}
+
+/// One thing to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Task {
+    /// The chessboard flat on the table.
+    Table,
+    /// The chessboard once more, another way.
+    Board,
+    /// The chart.
+    Chart,
+    /// A white sheet.
+    Sheet(Pose),
+    /// Pictures are there: the fit, which failed or was stopped.
+    Fit(Step),
+    /// Nothing.
+    Done,
+}
+
+impl Task {
+    /// The step that it belongs to; `None` where all are done.
+    pub fn step(self) -> Option<Step> {
+        match self {
+            Task::Table | Task::Board => Some(Step::Camera),
+            Task::Chart => Some(Step::Color),
+            Task::Sheet(Pose::Check) => Some(Step::Check),
+            Task::Sheet(_) => Some(Step::Lights),
+            Task::Fit(step) => Some(step),
+            Task::Done => None,
+        }
+    }
+}
+
+/// What is there.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// What the calibration says of itself.
+    pub status: Status,
+    /// Whether a calibration from pictures in the rig's `targets` folder is under way or finished.
+    pub begun: bool,
+    /// Pictures of the board, and of them those in which it was found.
+    pub boards: [usize; 2],
+    /// Whether the board on the table was found.
+    pub table: bool,
+    /// Every corner found so far, pixels.
+    pub corners_px: Vec<[f64; 2]>,
+    /// What they cover, and how well they fit.
+    pub so_far: BoardsSoFar,
+    /// Whether the chart is photographed.
+    pub chart: bool,
+    /// The sheets that are photographed.
+    pub sheets: Vec<Pose>,
+    /// Which of camera, colour and lights were made from what lies in `targets` now.
+    pub fresh: [bool; 3],
+    /// Whether the check passed; `None` before it.
+    pub passed: Option<bool>,
+    /// Days since the oldest part was made.
+    pub age_days: Option<i64>,
+    /// Earlier calibrations, the newest first.
+    pub history: Vec<String>,
+}
+
+/// Pictures of the board that a good camera needs.
+pub const BOARDS: usize = 12;
+
+impl State {
+    /// The one thing to do now.
+    pub fn next(&self) -> Task {
+        let calibrated = self.status.steps.iter().all(|step| step.state != StepState::Missing);
+        if calibrated && !self.begun {
+            return Task::Done;
+        }
+        if !self.fresh[0] {
+            return match (self.table, self.boards[1] < BOARDS) {
+                (false, _) => Task::Table,
+                (true, true) => Task::Board,
+                (true, false) => Task::Fit(Step::Camera),
+            };
+        }
+        if !self.fresh[1] {
+            return if self.chart { Task::Fit(Step::Color) } else { Task::Chart };
+        }
+        if let Some(pose) = Pose::FIT.into_iter().find(|pose| !self.sheets.contains(pose)) {
+            return Task::Sheet(pose);
+        }
+        if !self.fresh[2] {
+            return Task::Fit(Step::Lights);
+        }
+        match (self.sheets.contains(&Pose::Check), self.passed) {
+            (false, _) => Task::Sheet(Pose::Check),
+            (true, None) => Task::Fit(Step::Check),
+            (true, Some(_)) => Task::Done,
+        }
+    }
+
+    /// How far a step is: share of its pictures, and whether it is finished.
+    pub fn share(&self, step: Step) -> f32 {
+        let share = |part: usize, whole: usize| part.min(whole) as f32 / whole as f32;
+        let sheets = Pose::FIT.iter().filter(|pose| self.sheets.contains(pose)).count();
+        match step {
+            Step::Camera => share(self.boards[1], BOARDS),
+            Step::Color => share(usize::from(self.chart), 1),
+            Step::Lights => share(sheets, Pose::FIT.len()),
+            Step::Check => share(usize::from(self.passed.is_some()), 1),
+        }
+    }
+
+    /// The part of the picture that has the fewest corners: column and row of three by three.
+    pub fn emptiest(&self) -> [usize; 2] {
+        let [columns, rows] = self.so_far.coverage_grid;
+        let corners = |[i, j]: [usize; 2]| -> usize {
+            let inside = |k: &usize| (k % columns * 3 / columns, k / columns * 3 / rows) == (i, j);
+            (0..columns * rows).filter(inside).map(|k| self.so_far.coverage[k]).sum()
+        };
+        // The corners of the picture first: distortion is largest there.
+        let order = [[0, 0], [2, 2], [2, 0], [0, 2], [1, 0], [1, 2], [0, 1], [2, 1], [1, 1]];
+        if columns == 0 || rows == 0 {
+            return [1, 1];
+        }
+        order.into_iter().min_by_key(|place| corners(*place)).unwrap_or([1, 1])
+    }
+}
+
+/// What the technician says of his targets; the simulated rig knows its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TargetSettings {
+    /// Inner corners of the chessboard across and down.
+    pub board: [usize; 2],
+    /// Side of its squares, millimetres.
+    pub board_square_mm: f64,
+    /// Inner corners of the strip beside the white sheet.
+    pub strip: [usize; 2],
+    /// Side of its squares, millimetres.
+    pub strip_square_mm: f64,
+    /// Height of the raised sheet, millimetres.
+    pub raised_mm: f64,
+    /// Reflectance of the sheet.
+    pub reflectance: f64,
+    /// File with the chart's patches.
+    pub chart: String,
+    /// The light that boards are photographed under.
+    pub board_light: usize,
+    /// A calibration counts as old after so many days.
+    pub expires_after_days: i64,
+}
+
+impl Default for TargetSettings {
+    fn default() -> Self {
+        Self {
+            board: [9, 6],
+            board_square_mm: 25.0,
+            strip: [17, 3],
+            strip_square_mm: 9.0,
+            raised_mm: 100.0,
+            reflectance: 0.99,
+            chart: String::new(),
+            board_light: 0,
+            expires_after_days: 90,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> State {
+        let folder = tempfile::tempdir().unwrap();
+        State {
+            status: weavelight::calibrate::status(folder.path()).unwrap(),
+            begun: false,
+            boards: [0, 0],
+            table: false,
+            corners_px: Vec::new(),
+            so_far: BoardsSoFar::default(),
+            chart: false,
+            sheets: Vec::new(),
+            fresh: [false; 3],
+            passed: None,
+            age_days: None,
+            history: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn one_task_after_the_other() {
+        let mut state = state();
+        let check = |state: &State, expected: Task| assert_eq!(state.next(), expected);
+        check(&state, Task::Table);
+        state.boards = [3, 3];
+        check(&state, Task::Table);
+        state.table = true;
+        check(&state, Task::Board);
+        state.boards = [14, BOARDS];
+        check(&state, Task::Fit(Step::Camera));
+        state.fresh[0] = true;
+        check(&state, Task::Chart);
+        state.chart = true;
+        check(&state, Task::Fit(Step::Color));
+        state.fresh[1] = true;
+        for pose in Pose::FIT {
+            check(&state, Task::Sheet(pose));
+            state.sheets.push(pose);
+        }
+        check(&state, Task::Fit(Step::Lights));
+        state.fresh[2] = true;
+        check(&state, Task::Sheet(Pose::Check));
+        state.sheets.push(Pose::Check);
+        check(&state, Task::Fit(Step::Check));
+        state.passed = Some(false);
+        check(&state, Task::Done);
+        // A board that is photographed once more makes everything after it stale.
+        state.fresh = [false; 3];
+        check(&state, Task::Fit(Step::Camera));
+    }
+
+    #[test]
+    fn a_calibration_from_elsewhere_is_left_alone_until_it_is_begun_anew() {
+        let mut state = state();
+        state.status.steps.iter_mut().for_each(|step| step.state = StepState::Good);
+        assert_eq!(state.next(), Task::Done);
+        state.begun = true;
+        assert_eq!(state.next(), Task::Table);
+    }
+
+    #[test]
+    fn the_board_goes_where_no_corners_are() {
+        let mut state = state();
+        assert_eq!(state.emptiest(), [1, 1]);
+        let mut coverage = vec![5; 48];
+        coverage[47] = 0;
+        state.so_far = BoardsSoFar { coverage, coverage_grid: [8, 6], rms_px: None };
+        assert_eq!(state.emptiest(), [2, 2]);
+    }
+}

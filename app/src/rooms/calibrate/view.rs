@@ -1,0 +1,318 @@
+//! How the wizard looks.
+
+use super::picture::{Picture, paint_earlier};
+use super::task::{BOARDS, State, Step, TargetSettings, Task};
+use crate::place::Place;
+use crate::texts::calibrate as texts;
+use crate::theme::{self, meaning};
+use crate::widgets::Sign;
+use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
+use weavelight::calibrate::StepState;
+use weavelight::instrument::CameraKind;
+
+/// Height of the panel that shows what the boards cover.
+pub(super) const COVERAGE_HEIGHT: f32 = 108.0;
+
+/// The picture that was taken last.
+#[derive(Default)]
+pub(super) struct View {
+    picture: Option<(Picture, Option<TextureHandle>)>,
+}
+
+impl std::fmt::Debug for View {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("View").finish_non_exhaustive()
+    }
+}
+
+impl View {
+    pub(super) fn show(&mut self, picture: Picture) {
+        self.picture = Some((picture, None));
+    }
+
+    /// The picture as large as there is room, with what was found; `earlier`: corners of the pictures before it.
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, earlier: &[[f64; 2]]) {
+        let Some((picture, texture)) = &mut self.picture else { return nothing_yet(ui) };
+        ui.horizontal_wrapped(|ui| {
+            let sign = if picture.good { Sign::Good } else { Sign::Warning };
+            sign.ui(ui);
+            ui.label(&picture.note);
+        });
+        let texture = texture.get_or_insert_with(|| {
+            let image = picture.image.clone();
+            ui.ctx().load_texture("calibration picture", image, TextureOptions::LINEAR)
+        });
+        let room = ui.available_size();
+        let size = vec2(picture.size_px[0] as f32, picture.size_px[1] as f32);
+        let scale = (room.x / size.x).min(room.y / size.y).max(0.01);
+        ui.vertical_centered(|ui| {
+            let image = egui::Image::new(&*texture)
+                .fit_to_exact_size(size * scale)
+                .alt_text(texts::LAST_PICTURE);
+            let rect = ui.add(image).rect;
+            let painter = ui.painter_at(rect);
+            paint_earlier(&painter, rect, picture.size_px, earlier);
+            picture.marks.paint(&painter, rect, picture.size_px);
+        });
+    }
+}
+
+fn nothing_yet(ui: &mut egui::Ui) {
+    ui.vertical_centered(|ui| {
+        ui.add_space(ui.available_height() * 0.35);
+        ui.label(RichText::new(texts::NOTHING_YET).size(16.0).weak());
+    });
+}
+
+/// Whether the program lays the targets on the table by itself.
+pub(super) fn lays_by_itself(place: &Place) -> bool {
+    place.rig.camera.kind == CameraKind::Simulated
+}
+
+/// One step of the four: how far it is and how good. True where its pictures are to be taken again.
+pub(super) fn step(
+    ui: &mut egui::Ui,
+    state: &State,
+    step: Step,
+    now: Option<Step>,
+    figures: Option<&str>,
+) -> bool {
+    let is_now = now == Some(step);
+    let fill = if is_now { ui.visuals().faint_bg_color } else { egui::Color32::TRANSPARENT };
+    let frame = egui::Frame::new().fill(fill).inner_margin(8.0).corner_radius(6.0);
+    let stroke = if is_now { ui.visuals().selection.stroke } else { egui::Stroke::NONE };
+    let stroke = egui::Stroke::new(
+        stroke.width,
+        meaning::ACTIVE.gamma_multiply(if is_now { 1.0 } else { 0.0 }),
+    );
+    frame
+        .stroke(stroke)
+        .show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            let mut again = false;
+            ui.horizontal(|ui| {
+                mark(ui, state, step);
+                ui.label(RichText::new(texts::step(step)).strong());
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    if state.share(step) > 0.0 {
+                        let button = ui.small_button(texts::AGAIN).on_hover_text(texts::AGAIN_HINT);
+                        name(ui, &button, &texts::again(step));
+                        again = button.clicked();
+                    }
+                });
+            });
+            let quality = state
+                .status
+                .steps
+                .get(step as usize)
+                .filter(|step| step.state != StepState::Missing);
+            let text = figures.map(str::to_owned).or(quality.map(|step| step.quality.clone()));
+            let text = text.unwrap_or_else(|| texts::what(step).to_owned());
+            ui.add(egui::Label::new(RichText::new(text).weak()).wrap());
+            if is_now && state.share(step) > 0.0 && state.share(step) < 1.0 {
+                let text = texts::so_many(step, state);
+                ui.add(egui::ProgressBar::new(state.share(step)).text(text));
+            }
+            again
+        })
+        .inner
+}
+
+fn mark(ui: &mut egui::Ui, state: &State, step: Step) {
+    let of_status = state.status.steps.get(step as usize).map(|step| step.state);
+    let sign = match (step, of_status) {
+        (Step::Check, _) => match state.passed {
+            Some(true) => Some(Sign::Good),
+            Some(false) => Some(Sign::Bad),
+            None => None,
+        },
+        (_, Some(StepState::Good)) => Some(Sign::Good),
+        (_, Some(StepState::Improvable)) => Some(Sign::Warning),
+        _ => None,
+    };
+    match sign {
+        Some(sign) => sign.ui(ui),
+        None => {
+            let (rect, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
+            let stroke = egui::Stroke::new(1.5, ui.visuals().weak_text_color());
+            ui.painter().circle_stroke(rect.center(), 6.0, stroke);
+        }
+    }
+}
+
+/// A button among others of the same text has a name of its own.
+fn name(ui: &egui::Ui, response: &egui::Response, name: &str) {
+    let (enabled, name) = (ui.is_enabled(), name.to_owned());
+    response
+        .widget_info(move || egui::WidgetInfo::labeled(egui::Role::Button, enabled, name.clone()));
+}
+
+/// What to do, in large letters, and how.
+pub(super) fn instructions(ui: &mut egui::Ui, task: Task, state: &State, simulated: bool) {
+    ui.label(RichText::new(texts::title(task)).size(22.0).strong());
+    let how = texts::how(task, state, simulated);
+    ui.add(egui::Label::new(RichText::new(how).size(15.0)).wrap());
+    if simulated && !matches!(task, Task::Done | Task::Fit(_)) {
+        ui.add(egui::Label::new(RichText::new(texts::SIMULATED).weak()).wrap());
+    }
+    ui.add_space(theme::GAP);
+}
+
+/// When all is done: how good it is, and what would make it better.
+pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
+    let mut line = |sign: Sign, text: &str| {
+        ui.horizontal_top(|ui| {
+            sign.ui(ui);
+            ui.add(egui::Label::new(text).wrap());
+        });
+    };
+    if let Some(passed) = state.passed {
+        line(if passed { Sign::Good } else { Sign::Bad }, texts::verdict(passed));
+    }
+    if let Some(sigma) = state.status.position_sigma_mm {
+        line(Sign::Good, &texts::sigma(sigma, state.status.next_sigma_mm));
+    }
+    for advice in &state.status.exposure {
+        line(Sign::Warning, advice);
+    }
+    ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
+    ui.add_space(theme::GAP);
+}
+
+/// A build without OpenCV.
+pub(super) fn no_chessboards(ui: &mut egui::Ui) {
+    ui.horizontal_top(|ui| {
+        Sign::Warning.ui(ui);
+        ui.add(egui::Label::new(texts::NO_CHESSBOARDS).wrap().selectable(true));
+    });
+}
+
+/// What the technician says of the target in hand.
+pub(super) fn targets(
+    ui: &mut egui::Ui,
+    task: Task,
+    targets: &mut TargetSettings,
+    place: Option<&Place>,
+) {
+    let last_light = place.map_or(0, |place| place.rig.lights.len().saturating_sub(1));
+    ui.horizontal_wrapped(|ui| match task {
+        Task::Table | Task::Board => {
+            shape(ui, texts::BOARD, &mut targets.board, &mut targets.board_square_mm);
+            let value = egui::DragValue::new(&mut targets.board_light).range(0..=last_light);
+            field(ui, texts::LIGHT, value);
+        }
+        Task::Chart => {
+            let label = ui.label(texts::CHART);
+            let edit = egui::TextEdit::singleline(&mut targets.chart).desired_width(280.0);
+            ui.add(edit).labelled_by(label.id).on_hover_text(texts::CHART_HINT);
+            if ui.button(texts::BROWSE).clicked()
+                && let Some(file) = rfd::FileDialog::new().pick_file()
+            {
+                targets.chart = file.display().to_string();
+            }
+        }
+        Task::Sheet(pose) => {
+            let value = egui::DragValue::new(&mut targets.reflectance).range(0.1..=1.0);
+            field(ui, texts::REFLECTANCE, value.speed(0.005).max_decimals(3));
+            match pose {
+                super::Pose::Flat => {}
+                super::Pose::Raised => {
+                    let value = egui::DragValue::new(&mut targets.raised_mm).range(1.0..=300.0);
+                    field(ui, texts::RAISED, value.suffix(" mm"));
+                }
+                _ => shape(ui, texts::STRIP, &mut targets.strip, &mut targets.strip_square_mm),
+            }
+        }
+        Task::Fit(_) | Task::Done => {}
+    });
+}
+
+fn shape(ui: &mut egui::Ui, text: &str, [columns, rows]: &mut [usize; 2], square_mm: &mut f64) {
+    let label = ui.label(text);
+    ui.add(egui::DragValue::new(columns).range(2..=99)).labelled_by(label.id);
+    let by = ui.label("×");
+    ui.add(egui::DragValue::new(rows).range(2..=99)).labelled_by(by.id);
+    let of = ui.label(texts::SQUARES);
+    let value = egui::DragValue::new(square_mm).range(0.5..=200.0).speed(0.1).suffix(" mm");
+    ui.add(value).labelled_by(of.id);
+}
+
+fn field(ui: &mut egui::Ui, text: &str, value: egui::DragValue<'_>) {
+    let label = ui.label(text);
+    ui.add(value).labelled_by(label.id);
+}
+
+/// What the corners so far cover, and how well they fit.
+pub(super) fn coverage(ui: &mut egui::Ui, state: &State) {
+    let [columns, rows] = state.so_far.coverage_grid;
+    let [taken, found] = state.boards;
+    ui.horizontal_centered(|ui| {
+        let size = vec2(120.0, 80.0);
+        let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
+        let covered = state.so_far.coverage.iter().filter(|count| **count > 0).count();
+        let text = texts::covered(covered, columns * rows);
+        name(ui, &response, &text);
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+        for (k, count) in state.so_far.coverage.iter().enumerate() {
+            let cell = vec2(rect.width() / columns as f32, rect.height() / rows as f32);
+            let corner = rect.min + vec2((k % columns) as f32, (k / columns) as f32) * cell;
+            let strength = (*count as f32 / 12.0).min(1.0);
+            let color = meaning::ACTIVE.gamma_multiply(0.15 + 0.85 * strength);
+            if *count > 0 {
+                let field = egui::Rect::from_min_size(corner, cell).shrink(0.75);
+                painter.rect_filled(field, 1.0, color);
+            }
+        }
+        ui.vertical(|ui| {
+            ui.add_space(theme::GAP);
+            ui.label(RichText::new(texts::boards(found, BOARDS, taken - found)).strong());
+            ui.label(text);
+            ui.label(RichText::new(texts::reprojection(state.so_far.rms_px)).weak());
+        });
+    });
+}
+
+/// How old it is, and from when on that counts.
+pub(super) fn age(ui: &mut egui::Ui, state: &State, targets: &mut TargetSettings) {
+    let limit = targets.expires_after_days;
+    match state.age_days {
+        None => {
+            ui.label(RichText::new(texts::NEVER).weak());
+        }
+        Some(days) if days > limit => {
+            ui.horizontal_top(|ui| {
+                Sign::Warning.ui(ui);
+                ui.add(egui::Label::new(texts::expired(days)).wrap());
+            });
+        }
+        Some(days) => {
+            ui.add(egui::Label::new(texts::age(days)).wrap());
+        }
+    }
+    ui.horizontal(|ui| {
+        let value = egui::DragValue::new(&mut targets.expires_after_days).range(1..=3650);
+        field(ui, texts::EXPIRES, value.suffix(texts::DAYS));
+    });
+}
+
+/// Earlier calibrations; the one that is to be restored.
+pub(super) fn history(ui: &mut egui::Ui, state: &State, free: bool) -> Option<String> {
+    ui.label(RichText::new(texts::HISTORY).strong());
+    if state.history.is_empty() {
+        ui.label(RichText::new(texts::NO_HISTORY).weak());
+    }
+    let mut restore = None;
+    for entry in &state.history {
+        ui.horizontal(|ui| {
+            let when = texts::entry(entry);
+            ui.label(&when);
+            let button = ui.add_enabled(free, egui::Button::new(texts::RESTORE).small());
+            name(ui, &button, &texts::restore(&when));
+            if button.clicked() {
+                restore = Some(entry.clone());
+            }
+        });
+    }
+    restore
+}

@@ -1,0 +1,308 @@
+//! The Calibrate room.
+
+use crate::rooms::calibrate::{BOARDS, Pose, State, Step, Task};
+use weavelight::calibrate::SeenSheet;
+
+/// The button that takes the pictures of a task.
+pub const TAKE: &str = "Take the picture (Space)";
+/// The button that fits where that did not happen by itself.
+pub const FIT: &str = "Calculate (Space)";
+/// The button that takes a test shot.
+pub const LOOK: &str = "Look";
+/// What that does.
+pub const LOOK_HINT: &str = "A test shot with what is found in it drawn over it; nothing is kept";
+/// The button that goes on by itself.
+pub const AUTO: &str = "Do the rest by itself";
+/// What that does.
+pub const AUTO_HINT: &str = "The simulated rig lays and photographs every target that is left";
+/// The button that ends that.
+pub const STOP: &str = "Stop";
+/// The button that begins everything anew.
+pub const ANEW: &str = "Calibrate anew";
+/// What that does.
+pub const ANEW_HINT: &str =
+    "The calibration stays in use until each part is made anew, and goes into the history";
+/// The button that takes a step's pictures again.
+pub const AGAIN: &str = "Again";
+/// What that does.
+pub const AGAIN_HINT: &str = "Take the pictures of this step again";
+/// Name of the picture.
+pub const LAST_PICTURE: &str = "What the camera saw";
+/// Before the first picture.
+pub const NOTHING_YET: &str = "The picture appears here, with what is found in it.";
+/// On a simulated rig.
+pub const SIMULATED: &str =
+    "On the simulated rig nobody has hands: the program lays the target there by itself.";
+/// A build without OpenCV.
+pub const NO_CHESSBOARDS: &str = "This build cannot see chessboards. Build the window with `cargo build --release -p weavelight-app --features opencv` (on Debian: sudo apt install libopencv-dev clang), or calibrate the camera with `weavelight calibrate camera` from a build that has it.";
+/// The board's shape.
+pub const BOARD: &str = "Inner corners";
+/// The strip's shape.
+pub const STRIP: &str = "Strip beside the sheet: inner corners";
+/// Of either.
+pub const SQUARES: &str = "squares of";
+/// The light that boards are photographed under.
+pub const LIGHT: &str = "under light";
+/// The chart's file.
+pub const CHART: &str = "Chart file";
+/// What it holds.
+pub const CHART_HINT: &str = "A TOML file with schema = 1 and [[target.patches]]: where each patch lies in the picture, and its colour";
+/// Where it is missing.
+pub const NO_CHART: &str =
+    "the chart is not described; name its file, with [[target.patches]] as in a session.toml";
+/// Looks for a file.
+pub const BROWSE: &str = "Browse…";
+/// The sheet's reflectance.
+pub const REFLECTANCE: &str = "Reflectance";
+/// The raised sheet's height.
+pub const RAISED: &str = "Height over the table";
+/// No calibration yet.
+pub const NEVER: &str = "Not calibrated yet.";
+/// The limit of age.
+pub const EXPIRES: &str = "Counts as old after";
+/// Its unit.
+pub const DAYS: &str = " days";
+/// The heading of earlier calibrations.
+pub const HISTORY: &str = "Earlier calibrations";
+/// Where there are none.
+pub const NO_HISTORY: &str = "None yet.";
+/// The button that takes one back into use.
+pub const RESTORE: &str = "Restore";
+/// While pictures are looked at.
+pub const LOOKING: &str = "Looking at the pictures";
+/// While a test shot is taken.
+pub const TAKING_LOOK: &str = "Test shot";
+/// While the exposure is found.
+pub const METERING: &str = "finding the exposure";
+/// While the board is gone.
+pub const BOARD_LOST: &str = "the light board is gone; plug it in again";
+/// A picture without a board.
+pub const BOARD_NOT_FOUND: &str = "The board was not found: it must be whole, sharp and evenly lit in the picture. Take another one.";
+/// A sheet that cannot serve.
+pub const SHEET_REFUSED: &str = "This sheet cannot serve; the panel below says why. Take it again.";
+
+/// Names of the steps.
+pub fn step(step: Step) -> &'static str {
+    match step {
+        Step::Camera => "Camera",
+        Step::Color => "Colour",
+        Step::Lights => "Lights",
+        Step::Check => "Check",
+    }
+}
+
+/// What a step is for.
+pub fn what(step: Step) -> &'static str {
+    match step {
+        Step::Camera => "Lens, sensor and table, from a chessboard",
+        Step::Color => "Levels and colour, from a chart",
+        Step::Lights => "Where the lights are, from a white sheet",
+        Step::Check => "A sheet that the fit has not seen",
+    }
+}
+
+/// The button's name to those who do not see where it is.
+pub fn again(of: Step) -> String {
+    format!("{}: take the pictures again", step(of))
+}
+
+/// How many pictures are there.
+pub fn so_many(step: Step, state: &State) -> String {
+    match step {
+        Step::Camera => format!("{} of {BOARDS} pictures", state.boards[1]),
+        _ => format!("{} of {} sheets", state.sheets.len(), Pose::FIT.len()),
+    }
+}
+
+/// What to do, in a few words.
+pub fn title(task: Task) -> String {
+    match task {
+        Task::Table => "Lay the chessboard flat in the middle".to_owned(),
+        Task::Board => "Hold the chessboard another way".to_owned(),
+        Task::Chart => "Lay the colour chart on the table".to_owned(),
+        Task::Sheet(pose) => match pose {
+            Pose::Flat => "Lay the white sheet on the table".to_owned(),
+            Pose::Raised => "Raise the white sheet".to_owned(),
+            Pose::Tilt(k) => format!("Tilt the white sheet, {} of 4", k + 1),
+            Pose::Check => "Tilt the white sheet once more, to check".to_owned(),
+        },
+        Task::Fit(_) => "The pictures are there".to_owned(),
+        Task::Done => "The rig is calibrated".to_owned(),
+    }
+}
+
+/// Where in the picture, by column and row of three.
+fn place([column, row]: [usize; 2]) -> &'static str {
+    const PLACES: [[&str; 3]; 3] = [
+        ["the upper left corner", "the upper edge", "the upper right corner"],
+        ["the left edge", "the middle", "the right edge"],
+        ["the lower left corner", "the lower edge", "the lower right corner"],
+    ];
+    PLACES[row.min(2)][column.min(2)]
+}
+
+/// And how, in a sentence or two.
+pub fn how(task: Task, state: &State, simulated: bool) -> String {
+    match task {
+        Task::Table => "Its columns run along the picture, the whole board is in it. This picture says where the table is; then press Space.".to_owned(),
+        Task::Board => format!(
+            "Tilt it by 20 to 40 degrees, another way than before, and bring it to {} of the picture. Then press Space.",
+            place(state.emptiest())
+        ),
+        Task::Chart => "Where its patches are stated to be. It is photographed under every light, and under one at several exposures.".to_owned(),
+        Task::Sheet(Pose::Flat) => "Smooth, clean, and over the whole picture. It is photographed under every light; do not touch it until then.".to_owned(),
+        Task::Sheet(Pose::Raised) => "Level, on blocks, about 100 mm over the table. Two heights tell how far the lights are.".to_owned(),
+        Task::Sheet(Pose::Tilt(k)) => format!(
+            "Prop it up by about 20 degrees so that it faces {}{}. Tilts tell where the lights are.",
+            ["the upper right", "the upper left", "the lower left", "the lower right"][k.min(3)],
+            if simulated { "" } else { ", with the whole strip in the picture" }
+        ),
+        Task::Sheet(Pose::Check) => "Prop it up so that it faces the top of the picture. The calibration has not seen this sheet: what it makes of it tells how good it is.".to_owned(),
+        Task::Fit(_) => "The calculation was stopped or failed. Start it again, or take the pictures of this step again.".to_owned(),
+        Task::Done => "Scans are solved with this calibration from now on.".to_owned(),
+    }
+}
+
+/// While pictures are taken.
+pub fn taking(task: Task) -> String {
+    match task {
+        Task::Chart => "Photographing the chart".to_owned(),
+        Task::Sheet(_) => "Photographing the white sheet".to_owned(),
+        _ => "Photographing the chessboard".to_owned(),
+    }
+}
+
+/// While a step is calculated.
+pub fn fitting(step: Step) -> &'static str {
+    match step {
+        Step::Camera => "Calibrating the camera",
+        Step::Color => "Calibrating levels and colour",
+        Step::Lights => "Calibrating the lights",
+        Step::Check => "Checking the calibration",
+    }
+}
+
+/// A board that was found.
+pub fn board_found(corners: usize) -> String {
+    format!("The board is found: {corners} corners.")
+}
+
+/// A chart that was photographed.
+pub fn chart_taken(patches: usize, frames: usize) -> String {
+    format!("{patches} patches in {frames} frames. Each outline must lie within its patch.")
+}
+
+/// A sheet that serves.
+pub fn sheet_seen(seen: &SeenSheet) -> String {
+    format!(
+        "{} cells are measured; tilted by {:.1}°, {:.0} mm over the table, the brightest at {:.0} % of full scale.",
+        seen.cells_px.len(),
+        seen.tilt_deg,
+        seen.height_mm,
+        100.0 * seen.brightest
+    )
+}
+
+/// How many pictures of the board are good.
+pub fn boards(found: usize, wanted: usize, lost: usize) -> String {
+    let lost = match lost {
+        0 => String::new(),
+        lost => format!("; {lost} more without a board"),
+    };
+    format!("{found} of {wanted} pictures{lost}")
+}
+
+/// What the corners cover.
+pub fn covered(fields: usize, of: usize) -> String {
+    match of {
+        0 => "No corners yet".to_owned(),
+        of => format!("Corners in {fields} of {of} fields"),
+    }
+}
+
+/// How well the camera fits so far.
+pub fn reprojection(rms_px: Option<f64>) -> String {
+    match rms_px {
+        Some(rms) => format!("Reprojection error now {rms:.3} px; below 0.3 is good"),
+        None => "Reprojection error: after four pictures".to_owned(),
+    }
+}
+
+/// What came of the camera.
+pub fn camera_figures(boards: usize, rms_px: f64, height_mm: f64) -> String {
+    format!("{boards} boards, reprojection error {rms_px:.3} px, {height_mm:.1} mm over the table")
+}
+
+/// What came of levels and colour.
+pub fn color_figures(nonlinearity: Option<f64>, de2000: Option<f64>) -> String {
+    let linear = nonlinearity.map_or("linearity not measured".to_owned(), |bend| {
+        format!("linear within {:.2} %", 100.0 * bend)
+    });
+    let color = de2000
+        .map_or("no colour patches".to_owned(), |de| format!("colours within CIEDE2000 {de:.2}"));
+    format!("{linear}, {color}")
+}
+
+/// What came of the lights.
+pub fn lights_figures(sigma_mm: f64, moved_mm: f64) -> String {
+    format!("Positions within {sigma_mm:.2} mm; the ruler was off by up to {moved_mm:.1} mm")
+}
+
+/// What came of the check.
+pub fn check_figures(passed: bool, rms_deg: f64, limit_deg: f64) -> String {
+    let verdict = if passed { "Passed" } else { "Failed" };
+    format!("{verdict}: slopes within {rms_deg:.3}° (limit {limit_deg}°)")
+}
+
+/// Of the check, in a sentence.
+pub fn verdict(passed: bool) -> &'static str {
+    if passed {
+        "A sheet that the calibration has not seen is solved right."
+    } else {
+        "A sheet that the calibration has not seen is solved wrong; photograph the sheets again, clean, flat and at rest."
+    }
+}
+
+/// How well the lights' places are known, now and after what is advised.
+pub fn sigma(now_mm: f64, then_mm: Option<f64>) -> String {
+    let then =
+        then_mm.map_or(String::new(), |then| format!(", {then:.2} mm after what is advised below"));
+    format!("The lights' places are known within {now_mm:.2} mm{then}.")
+}
+
+/// What would make it better.
+pub fn better(next: &str) -> String {
+    format!("What would improve it most: {next}.")
+}
+
+/// How old it is.
+pub fn age(days: i64) -> String {
+    match days {
+        ..=0 => "Calibrated today.".to_owned(),
+        1 => "Calibrated yesterday.".to_owned(),
+        days => format!("Calibrated {days} days ago."),
+    }
+}
+
+/// Too old.
+pub fn expired(days: i64) -> String {
+    format!(
+        "Calibrated {days} days ago: LEDs age and stands get moved. Check it on a tilted sheet, or calibrate anew."
+    )
+}
+
+/// An entry of the history: `calibration-2026-11-22T1648` as people write it.
+pub fn entry(name: &str) -> String {
+    let stamp = name.strip_prefix("calibration-").unwrap_or(name);
+    match stamp.split_once('T') {
+        Some((day, time)) if time.len() >= 4 && time.is_char_boundary(2) => {
+            format!("{day} {}:{} UTC", &time[..2], &time[2..])
+        }
+        _ => stamp.to_owned(),
+    }
+}
+
+/// The button's name to those who do not see where it is.
+pub fn restore(when: &str) -> String {
+    format!("Restore the calibration of {when}")
+}
