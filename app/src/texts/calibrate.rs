@@ -8,7 +8,7 @@ pub const TAKE: &str = "Take the picture (Space)";
 /// The button that fits where that did not happen by itself.
 pub const FIT: &str = "Calculate (Space)";
 /// The button that takes a test shot.
-pub const LOOK: &str = "Look";
+pub const LOOK: &str = "Look first";
 /// What that does.
 pub const LOOK_HINT: &str = "A test shot with what is found in it drawn over it; nothing is kept";
 /// The button that goes on by itself.
@@ -109,8 +109,8 @@ pub fn again(of: Step) -> String {
 /// How many pictures are there.
 pub fn so_many(step: Step, state: &State) -> String {
     match step {
-        Step::Camera => format!("{} of {BOARDS} pictures", state.boards[1]),
-        _ => format!("{} of {} sheets", state.sheets.len(), Pose::FIT.len()),
+        Step::Camera => format!("{} / {BOARDS}", state.boards[1]),
+        _ => format!("{} / {}", state.sheets.len(), Pose::FIT.len()),
     }
 }
 
@@ -235,8 +235,8 @@ pub fn camera_figures(boards: usize, rms_px: f64, height_mm: f64) -> String {
 
 /// What came of levels and colour.
 pub fn color_figures(nonlinearity: Option<f64>, de2000: Option<f64>) -> String {
-    let linear = nonlinearity.map_or("linearity not measured".to_owned(), |bend| {
-        format!("linear within {:.2} %", 100.0 * bend)
+    let linear = nonlinearity.map_or("Linearity not measured".to_owned(), |bend| {
+        format!("Linear within {:.2} %", 100.0 * bend)
     });
     let color = de2000
         .map_or("no colour patches".to_owned(), |de| format!("colours within CIEDE2000 {de:.2}"));

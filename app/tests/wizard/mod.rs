@@ -2,8 +2,11 @@
 
 use crate::desk::{self, Window};
 use eframe::egui;
-use egui_kittest::{SnapshotResults, kittest::Queryable};
+use egui_kittest::SnapshotResults;
+use egui_kittest::kittest::{NodeT, Queryable};
 use weavelight::simulate;
+#[cfg(feature = "opencv")]
+use weavelight_app::desk::Severity;
 use weavelight_app::{rooms::Room, worker::Command};
 
 /// As small as a chessboard's corners allow.
@@ -106,11 +109,9 @@ fn the_wizard_goes_to_a_finished_calibration() {
     window.until_label("Tilt the white sheet once more, to check");
     window.until_label("The rig is calibrated");
     window.idle();
-    assert!(
-        window.harness.state().desk().problems.is_empty(),
-        "{:?}",
-        window.harness.state().desk()
-    );
+    let problems = &window.harness.state().desk().problems;
+    let failed = problems.iter().any(|problem| problem.severity == Severity::Error);
+    assert!(!failed, "{problems:?}");
     looks(&mut window, "calibrate-done", &mut results);
     check_names(&window);
     check_against_truth(&window);

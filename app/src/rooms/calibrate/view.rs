@@ -80,11 +80,8 @@ pub(super) fn step(
     let is_now = now == Some(step);
     let fill = if is_now { ui.visuals().faint_bg_color } else { egui::Color32::TRANSPARENT };
     let frame = egui::Frame::new().fill(fill).inner_margin(8.0).corner_radius(6.0);
-    let stroke = if is_now { ui.visuals().selection.stroke } else { egui::Stroke::NONE };
-    let stroke = egui::Stroke::new(
-        stroke.width,
-        meaning::ACTIVE.gamma_multiply(if is_now { 1.0 } else { 0.0 }),
-    );
+    let color = if is_now { meaning::ACTIVE } else { egui::Color32::TRANSPARENT };
+    let stroke = egui::Stroke::new(1.0, color);
     frame
         .stroke(stroke)
         .show(ui, |ui| {
@@ -175,7 +172,9 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
     for advice in &state.status.exposure {
         line(Sign::Warning, advice);
     }
-    ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
+    if state.status.steps.iter().any(|step| step.state != StepState::Good) {
+        ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
+    }
     ui.add_space(theme::GAP);
 }
 

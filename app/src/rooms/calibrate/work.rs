@@ -144,6 +144,8 @@ fn subject(
             let own_strip =
                 level_mm.is_none().then(|| shape(settings.strip, settings.strip_square_mm));
             let strip = if simulated { target.board } else { own_strip };
+            // Without detection only a stated plane serves, and the strip is left to the fit's own outlier test.
+            let strip = strip.filter(|_| cfg!(feature = "opencv"));
             let reflectance = target.reflectance.or(Some(settings.reflectance));
             (Subject::White(Sheet { reflectance, plane, strip }), level_mm)
         }
@@ -298,7 +300,7 @@ fn examine(task: Task, place: &Place, out: &Outbox) -> Result<bool, AnyError> {
                 Err(error) => {
                     tell(Picture::new(&frame, Marks::None, texts::SHEET_REFUSED.to_owned(), false));
                     // It would spoil the fit: what it says is what to photograph instead.
-                    std::fs::remove_dir_all(&folder)?;
+                    put_aside(place, &folder)?;
                     Err(error.into())
                 }
             }
@@ -312,6 +314,15 @@ fn examine(task: Task, place: &Place, out: &Outbox) -> Result<bool, AnyError> {
             Ok(tell(board_picture(&frame, &board, seen)))
         }
     }
+}
+
+/// Out of the way of the fit; the last one that was refused can still be looked at.
+fn put_aside(place: &Place, folder: &Path) -> std::io::Result<()> {
+    let refused = place.targets().join("refused");
+    if refused.exists() {
+        std::fs::remove_dir_all(&refused)?;
+    }
+    std::fs::rename(folder, &refused)
 }
 
 fn read(session: &Session, entry: &FrameEntry) -> Result<Frame, AnyError> {
@@ -449,7 +460,8 @@ fn look_for_boards(
     };
     let mut all = Vec::new();
     for (k, entry) in session.frames.iter().enumerate() {
-        out.tick(k as f64 / session.frames.len() as f64, texts::LOOKING);
+        // No tick: what is there is told after work that was stopped, too.
+        out.progress(k as f64 / session.frames.len() as f64, texts::LOOKING, None);
         let hash = entry.sha256.clone().unwrap_or_default();
         let seen = match memory.seen.get(&hash) {
             Some(seen) => seen.clone(),
