@@ -1,5 +1,11 @@
 //! The Calibrate room: the wizard on a small simulated rig, with the real board, camera and estimators.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a test that cannot go on panics; figures are to be seen"
+)]
+
 use crate::desk::{self, Window};
 use eframe::egui;
 use egui_kittest::SnapshotResults;
@@ -125,6 +131,32 @@ fn the_wizard_goes_to_a_finished_calibration() {
     let [kept] = kept.as_slice() else { panic!("{kept:?}") };
     assert!(kept.path().join("calibration/lights.toml").exists());
     assert!(kept.path().join("targets/white-flat/session.toml").exists());
+}
+
+/// The simulated rig that the first start offers, at a quarter of full size: `--run-ignored all --no-capture` tells how long it takes.
+#[cfg(feature = "opencv")]
+#[test]
+#[ignore = "a minute of measuring time"]
+fn the_first_calibration_takes_two_minutes() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    let folder = window.home().join("first");
+    window.harness.state_mut().ask(Command::MakeSimulatedRig(folder));
+    window.until("the rig is open", |app| app.desk().place.is_some());
+    window.enter(Room::Calibrate);
+    window.idle();
+    let begun = std::time::Instant::now();
+    window.click("Do the rest by itself");
+    for task in [
+        "Lay the colour chart on the table",
+        "Raise the white sheet",
+        "Tilt the white sheet, 2 of 4",
+        "Tilt the white sheet, 4 of 4",
+        "The rig is calibrated",
+    ] {
+        window.until_label(task);
+        eprintln!("{:5.1} s: {task}", begun.elapsed().as_secs_f64());
+    }
+    assert!(begun.elapsed().as_secs() < 120);
 }
 
 /// The lights are where they are in truth, not where the ruler put them.
