@@ -2,7 +2,8 @@
 
 use crate::desk::{Activity, Brake, Desk};
 use crate::rooms::{
-    Room, calibrate::Calibrate, look::Look, rig::Rig, scan::Scan, scans::Scans, welcome::Welcome,
+    Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan::Scan, scans::Scans,
+    welcome::Welcome,
 };
 use crate::settings::{Settings, Theme};
 use crate::worker::{Command, Update, Worker};
@@ -33,7 +34,7 @@ impl App {
         if let Some(rig) = settings.rig.clone().filter(|rig| rig.exists()) {
             worker.ask(Command::Open(rig));
         }
-        let _ = renderer;
+        look::view::install(ctx, renderer);
         Self {
             desk: Desk::new(settings),
             worker,

@@ -427,3 +427,6 @@ pub mod scans {
         ]
     }
 }
+
+/// The Look room.
+pub mod look;

@@ -55,6 +55,8 @@ pub(super) struct Worker {
     solver: RowSolver,
     residual: Vec<f32>,
     kept: Vec<u64>,
+    /// Whether `kept` is filled where the albedo does not need it.
+    notes_kept: bool,
     /// The tile under way, and the one being prepared.
     pub(super) tiles: [TileRows; 2],
     /// What the fit leaves over of one light, as wide as the frame.
@@ -67,6 +69,20 @@ pub(super) struct ReadRow<'r> {
     pub(super) columns: Range<usize>,
     pub(super) rows: &'r mut SignalRows,
     pub(super) field: FieldRow<'r>,
+}
+
+/// One photosite of a row, as the run solves it.
+pub(super) struct Lone {
+    pub(super) normal: [f32; 3],
+    pub(super) albedo: f32,
+    pub(super) expected_error_deg: f32,
+    pub(super) residual: f32,
+    pub(super) outcome: Outcome,
+    /// Bit i set where the sample of light i took part.
+    pub(super) kept: u64,
+    /// Per light: y, NaN where unusable; and its vector.
+    pub(super) signal: Vec<f32>,
+    pub(super) vectors: Vec<[f64; 3]>,
 }
 
 impl<'a> Run<'a> {
@@ -180,6 +196,51 @@ impl<'a> Run<'a> {
         Maps { normal, albedo, expected_error_deg, outcome, counts }
     }
 
+    /// Solves columns `columns` of row `y` and hands over each photosite. They must begin where [`Run::columns_inside`] could.
+    pub(super) fn solve_some(
+        &self,
+        y: usize,
+        columns: Range<usize>,
+        mut take: impl FnMut(usize, Lone),
+    ) {
+        let width = self.scene.width;
+        let mut worker = Worker { notes_kept: true, ..Worker::default() };
+        let (mut normal, mut rgb) = (vec![[0.0; 3]; width], vec![[0.0; 3]; width]);
+        let (mut albedo, mut expected_error_deg) = (vec![0.0; width], vec![0.0; width]);
+        let mut outcome = vec![Outcome::Masked; width];
+        let mut band = Band {
+            first_row: y,
+            normal: &mut normal,
+            albedo: &mut albedo,
+            rgb: &mut rgb,
+            expected_error_deg: &mut expected_error_deg,
+            outcome: &mut outcome,
+        };
+        let (mut fields, mut rows) = (FieldRows::new(self.field), SignalRows::default());
+        self.read_row(y, columns.clone(), &mut rows);
+        let field = fields.row(y, columns.start);
+        let read = ReadRow { y, columns: columns.clone(), rows: &mut rows, field };
+        let mut counts = Counts::default();
+        self.write_row(&mut worker, &mut band, read, &mut counts, |solver, input, output| {
+            solver.solve(input, output, self.method)
+        });
+        let signals = rows.signals();
+        for x in columns.clone() {
+            let at = x - columns.start;
+            let lone = Lone {
+                normal: normal[x],
+                albedo: albedo[x],
+                expected_error_deg: expected_error_deg[x],
+                residual: worker.residual[at],
+                outcome: outcome[x],
+                kept: worker.kept[at],
+                signal: signals.iter().map(|row| row[at]).collect(),
+                vectors: (0..field.lights).map(|light| field.at(at, light).into()).collect(),
+            };
+            take(x, lone);
+        }
+    }
+
     fn solve_band(
         &self,
         worker: &mut Worker,
@@ -240,7 +301,7 @@ impl<'a> Run<'a> {
         counts: &mut Counts,
         kernel: impl FnOnce(&mut RowSolver, &RowInput, &mut RowOutput) -> Result<(), RowError>,
     ) {
-        let Worker { solver, residual, kept, of_light, .. } = worker;
+        let Worker { solver, residual, kept, notes_kept, of_light, .. } = worker;
         let inside = self.inside(y, &columns);
         residual.resize(columns.len(), 0.0);
         kept.resize(columns.len(), 0);
@@ -252,7 +313,7 @@ impl<'a> Run<'a> {
             expected_error_deg: &mut band.expected_error_deg[span.clone()],
             residual,
             outcome: &mut band.outcome[span.clone()],
-            kept: (self.scene.layout == Layout::Rgb).then_some(kept.as_mut_slice()),
+            kept: (*notes_kept || self.scene.layout == Layout::Rgb).then_some(kept.as_mut_slice()),
         };
         let signal: Vec<&[f32]> = rows.signals().iter().map(Vec::as_slice).collect();
         let (variance, noise_scale) = (&self.variance[y & 1], rows.noise_scale());

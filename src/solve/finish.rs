@@ -55,7 +55,7 @@ pub(crate) fn finish(maps: Maps, color: &Color, outputs: Outputs) -> Finished {
     Finished { normal, albedo, confidence: expected_error_deg, mask }
 }
 
-fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
+pub(super) fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
     let matrix = matrix.cast::<f32>();
     albedo
         .data

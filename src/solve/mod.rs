@@ -19,6 +19,7 @@ mod finish;
 mod gain;
 mod idle;
 mod in_memory;
+mod inspect;
 mod load;
 mod maps;
 mod mask_file;
@@ -51,6 +52,7 @@ pub use in_memory::{
     SolvedScene, leave_out_what_adds_nothing, solve_scene, solve_scene_on,
     solve_scene_with_residuals,
 };
+pub use inspect::{Part, Photosite, Sample};
 pub use load::load_scene;
 pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 pub use mask_file::{MASK_FILE, MaskMade, MaskOptions, make_mask};

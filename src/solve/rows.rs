@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use weavelight_calibration::description::Image;
 
 /// A scene whose rows can be handed to any kernel.
-pub struct Rows<'a>(Run<'a>);
+pub struct Rows<'a>(pub(super) Run<'a>);
 
 /// What a thread keeps from row to row.
 struct Buffers {
@@ -30,10 +30,22 @@ impl Rows<'_> {
     /// # Errors
     /// As [`super::solve_scene`].
     pub fn with<T>(scene: &Scene, work: impl FnOnce(&Rows) -> T) -> Result<T, SolveError> {
+        Self::with_method(scene, Method::LeastSquares, work)
+    }
+
+    /// The same for rows that are solved by the program's own `method` ([`Rows::photosite`], [`Rows::residual_of`]).
+    ///
+    /// # Errors
+    /// As [`super::solve_scene`].
+    pub fn with_method<T>(
+        scene: &Scene,
+        method: Method,
+        work: impl FnOnce(&Rows) -> T,
+    ) -> Result<T, SolveError> {
         check_frames(scene)?;
         let field = light_field(scene)?;
         check_light_field(scene, &field)?;
-        Ok(work(&Rows(Run::new(scene, &field, noise(scene, &field), Method::LeastSquares))))
+        Ok(work(&Rows(Run::new(scene, &field, noise(scene, &field), method))))
     }
 
     /// The scene.

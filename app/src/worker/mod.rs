@@ -84,6 +84,8 @@ pub struct Tools {
     pub instruments: Option<Instruments>,
     /// What was seen in pictures of targets.
     pub calibrate: calibrate::Memory,
+    /// The frames that the Look room asked about last.
+    pub frames: look::Frames,
 }
 
 /// The worker as the window sees it.

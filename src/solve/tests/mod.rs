@@ -2,6 +2,7 @@ mod folders;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod idle;
+mod inspections;
 mod previews;
 mod reduced;
 mod residuals;

@@ -1,0 +1,143 @@
+//! A photosite from near: its neighbours, its numbers, and the lights that it rests on.
+
+use super::Look;
+use super::view::{Maps, Sample, shade};
+use crate::texts::look as texts;
+use crate::theme::{self, meaning};
+use eframe::egui::{
+    self, Color32, Grid, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
+};
+use weavelight::solve::{Part, Photosite};
+
+/// Photosites along the loupe's side: odd, so that one is in the middle.
+const SIDE: isize = 11;
+/// Side of one, points.
+const CELL: f32 = 8.0;
+
+impl Look {
+    pub(super) fn loupe(&self, ui: &mut Ui) {
+        let Some(maps) = self.opened.as_ref().map(|opened| &opened.maps) else { return };
+        let clicked = self.taken.as_ref().map(|taken| taken.at);
+        let Some(at) = self.canvas.hovered.or(clicked) else {
+            ui.label(RichText::new(texts::POINT_AT).weak());
+            return;
+        };
+        let sample = maps.sample(at[0], at[1]);
+        ui.horizontal_top(|ui| {
+            magnify(ui, maps, at);
+            ui.vertical(|ui| numbers(ui, maps, at, sample.as_ref()));
+        });
+        match &self.taken {
+            Some(taken) => {
+                ui.add_space(theme::GAP);
+                self.lights_of(ui, taken);
+            }
+            None => {
+                ui.label(RichText::new(texts::CLICK_FOR_LIGHTS).weak().small());
+            }
+        }
+    }
+
+    /// Which lights the photosite that was clicked rests on, and why not on the others.
+    fn lights_of(&self, ui: &mut Ui, taken: &super::Taken) {
+        ui.label(RichText::new(texts::photosite(taken.at)).strong());
+        let changed = self.opened.as_ref().and_then(|o| o.capture.as_ref()).map(|c| c.changed);
+        match (&taken.found, changed) {
+            (None, _) => {
+                ui.label(RichText::new(texts::SOLVING_AGAIN).weak());
+            }
+            (Some(None), None) => {
+                ui.label(RichText::new(texts::NO_FRAMES).weak());
+            }
+            (Some(None), Some(_)) => {
+                ui.label(RichText::new(texts::NOT_SOLVED_AGAIN).weak());
+            }
+            (Some(Some(photosite)), changed) => {
+                if changed == Some(true) {
+                    ui.label(RichText::new(texts::FRAMES_CHANGED).color(meaning::WARNING));
+                }
+                table(ui, photosite);
+            }
+        }
+    }
+}
+
+/// The neighbourhood, coloured by albedo.
+fn magnify(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2]) {
+    let size = egui::Vec2::splat(SIDE as f32 * CELL);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, texts::LOUPE));
+    let painter = ui.painter();
+    painter.rect_filled(rect, 0.0, ui.visuals().extreme_bg_color);
+    let cell = |k: isize, l: isize| {
+        let corner = rect.min + vec2(k as f32, l as f32) * CELL;
+        Rect::from_min_max(corner, corner + egui::Vec2::splat(CELL))
+    };
+    let neighbour = |at: usize, offset: isize| at.checked_add_signed(offset - SIDE / 2);
+    for l in 0..SIDE {
+        for k in 0..SIDE {
+            let place = neighbour(x, k).zip(neighbour(y, l));
+            if let Some(sample) = place.and_then(|(x, y)| maps.sample(x, y)) {
+                painter.rect_filled(cell(k, l), 0.0, shade::on_screen(sample.albedo));
+            }
+        }
+    }
+    let middle = cell(SIDE / 2, SIDE / 2);
+    painter.rect_stroke(middle, 0.0, Stroke::new(3.0, Color32::BLACK), StrokeKind::Outside);
+    painter.rect_stroke(middle, 0.0, Stroke::new(1.5, meaning::LIT), StrokeKind::Outside);
+}
+
+fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>) {
+    let row = |ui: &mut Ui, name: &str, value: String| {
+        ui.label(RichText::new(name).weak().small());
+        ui.label(RichText::new(value).monospace().size(12.0));
+        ui.end_row();
+    };
+    Grid::new("photosite").num_columns(2).spacing([6.0, 2.0]).min_row_height(15.0).show(ui, |ui| {
+        row(ui, texts::PIXEL, format!("{x}, {y}"));
+        if maps.geometry.is_physical() {
+            let point = maps.geometry.on_plane([x as f64, y as f64]);
+            row(ui, texts::PLACE, format!("{:.2}, {:.2} mm", point.x, point.y));
+        }
+        let Some(sample) = sample else {
+            row(ui, texts::NORMAL, texts::UNSOLVED.to_owned());
+            return;
+        };
+        let [nx, ny, nz] = sample.normal;
+        row(ui, texts::NORMAL, format!("{nx:.3} {ny:.3} {nz:.3}"));
+        row(ui, texts::SLOPE, format!("{:.1}°", sample.slope_deg()));
+        let [r, g, b] = sample.albedo;
+        row(ui, texts::ALBEDO, format!("{r:.3} {g:.3} {b:.3}"));
+        row(ui, texts::ERROR, format!("{:.2}°", sample.error_deg));
+    });
+}
+
+fn table(ui: &mut Ui, photosite: &Photosite) {
+    Grid::new("lights").num_columns(4).spacing([8.0, 2.0]).min_row_height(16.0).show(ui, |ui| {
+        for title in texts::LIGHT_COLUMNS {
+            ui.label(RichText::new(title).weak().small());
+        }
+        ui.end_row();
+        for sample in &photosite.samples {
+            let number = |value: Option<f32>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
+            ui.label(RichText::new(sample.light.to_string()).monospace().size(12.0));
+            ui.label(RichText::new(number(sample.measured)).monospace().size(12.0));
+            ui.label(RichText::new(number(sample.predicted)).monospace().size(12.0));
+            let (sign, color, text) = verdict(ui, sample.part);
+            let verdict = format!("{sign} {text}");
+            ui.label(RichText::new(verdict).color(color).size(12.0));
+            ui.end_row();
+        }
+    });
+}
+
+fn verdict(ui: &Ui, part: Part) -> (&'static str, Color32, &'static str) {
+    let plain = ui.visuals().text_color();
+    match part {
+        Part::Used => ("✔", plain, texts::USED),
+        Part::Unusable => ("✖", meaning::BAD, texts::CLIPPED),
+        Part::TooDark => ("▼", meaning::WARNING, texts::TOO_DARK),
+        Part::TooBright => ("▲", meaning::WARNING, texts::TOO_BRIGHT),
+        Part::Unsolved => ("–", plain, texts::UNSOLVED),
+    }
+}

@@ -1,0 +1,413 @@
+//! The Look room: a solution's maps under any light.
+//!
+//! - [`view`]: the widget that draws maps; other rooms embed it
+//! - `opened`: a solution off the disk; `work`: the worker's part
+//! - `layer`: what can be shown; `lamp`: under which light
+//! - `canvas`: the maps with what is drawn over them, and the mouse; `legend`: scales
+//! - `side`: the panel beside them; `loupe`: the numbers of a photosite; `plots`: histogram and profile
+//! - [`slopes`], [`profile`], [`mask`]: the sums behind
+
+mod canvas;
+mod lamp;
+mod layer;
+mod legend;
+mod loupe;
+pub mod mask;
+mod opened;
+mod plots;
+pub mod profile;
+mod side;
+pub mod slopes;
+pub mod view;
+mod work;
+
+pub use opened::{Capture, Opened};
+pub use work::Frames;
+
+use crate::desk::Desk;
+use crate::rooms::Room;
+use crate::settings::SolveSettings;
+use crate::texts::look as texts;
+use crate::worker::{Command, Outbox, Tools};
+use crate::{theme, widgets};
+use eframe::egui::{self, RichText};
+use lamp::Lamp;
+use layer::Layers;
+use mask::Painting;
+use slopes::Distribution;
+use std::path::PathBuf;
+use std::sync::Arc;
+use view::{MapView, Pyramid};
+use weavelight::solve::Photosite;
+use weavelight_calibration::description::Image;
+
+/// What this room asks of the worker.
+#[derive(Debug)]
+pub enum Ask {
+    /// Look at the solution in this folder.
+    Open(PathBuf),
+    /// Compare with the solution in this folder; the surface is the one that is looked at.
+    Compare(PathBuf, Arc<Pyramid>),
+    /// What the frames of a light show, of this capture session.
+    Picture(PathBuf, usize),
+    /// What a light measures over what the solution predicts.
+    Residual(PathBuf, usize),
+    /// Solve one photosite again: which lights does it rest on?
+    Photosite(PathBuf, [usize; 2]),
+    /// Save the mask of a capture session.
+    Mask(PathBuf, Box<Image<bool>>),
+    /// Solve a capture session again and look at it.
+    Solve(PathBuf, SolveSettings),
+}
+
+/// What the worker tells this room.
+#[derive(Debug)]
+pub enum Told {
+    /// A solution is there.
+    Opened(Box<Opened>),
+    /// Another solution to compare with.
+    Other {
+        /// Its name.
+        name: String,
+        /// Its normals.
+        surface: Arc<Pyramid>,
+        /// The angles between both.
+        angles: Option<Distribution>,
+    },
+    /// A light's frames.
+    Picture {
+        /// The light.
+        light: usize,
+        /// Linear RGB, as albedo times the light vector.
+        picture: Arc<Pyramid>,
+    },
+    /// A light's residual.
+    Residual {
+        /// The light.
+        light: usize,
+        /// Units of albedo.
+        picture: Arc<Pyramid>,
+    },
+    /// A photosite, solved again.
+    Photosite {
+        /// Which.
+        at: [usize; 2],
+        /// `None` where that failed.
+        found: Option<Box<Photosite>>,
+    },
+    /// The mask is on the disk.
+    MaskSaved,
+}
+
+/// What the mouse does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Tool {
+    /// Moves the light, where one can be moved, or the picture; a click takes a photosite.
+    #[default]
+    Hand,
+    /// Draws a line to measure along.
+    Line,
+    /// Paints the mask with a brush.
+    Brush,
+    /// Fills a line into the mask.
+    Lasso,
+}
+
+/// What this room keeps.
+#[derive(Debug, Default)]
+pub struct Look {
+    opened: Option<Box<Opened>>,
+    view: MapView,
+    layers: Layers,
+    lamp: Lamp,
+    tool: Tool,
+    canvas: canvas::Canvas,
+    other: Option<Other>,
+    /// A light's frames and its residual: the last ones.
+    picture: Option<(usize, Arc<Pyramid>)>,
+    residual: Option<(usize, Arc<Pyramid>)>,
+    /// What was asked of the worker and has not come yet.
+    awaited: Option<Awaited>,
+    taken: Option<Taken>,
+    line: Option<[[f64; 2]; 2]>,
+    profile: Option<profile::Profile>,
+    painting: Option<Painting>,
+    path: String,
+}
+
+/// Another solution.
+#[derive(Debug)]
+struct Other {
+    name: String,
+    surface: Arc<Pyramid>,
+    angles: Option<Distribution>,
+}
+
+/// Something that the worker makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Awaited {
+    Picture(usize),
+    Residual(usize),
+}
+
+/// The photosite that was clicked.
+#[derive(Debug)]
+struct Taken {
+    at: [usize; 2],
+    /// `None` until it comes.
+    found: Option<Option<Box<Photosite>>>,
+}
+
+impl Look {
+    /// Draws the room.
+    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        self.take_dropped(ui, desk);
+        if self.opened.is_none() {
+            return self.nothing_yet(ui, desk);
+        }
+        self.keys(ui);
+        egui::Panel::top("look head").show(ui, |ui| self.head(ui, desk));
+        egui::Panel::right("look side")
+            .exact_size(280.0)
+            .resizable(false)
+            .show(ui, |ui| self.side(ui, desk));
+        if self.profile.is_some() {
+            egui::Panel::bottom("look profile").exact_size(190.0).show(ui, |ui| self.plot(ui));
+        }
+        let frame = egui::Frame::new().inner_margin(0);
+        egui::CentralPanel::default().frame(frame).show(ui, |ui| self.maps(ui, desk));
+        self.await_layers(desk);
+    }
+
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
+        match told {
+            Told::Opened(opened) => self.take(opened, desk),
+            Told::Other { name, surface, angles } => {
+                self.other = Some(Other { name, surface, angles });
+                self.layers.compare();
+            }
+            Told::Picture { light, picture } => {
+                self.awaited = None;
+                self.picture = Some((light, picture));
+            }
+            Told::Residual { light, picture } => {
+                self.awaited = None;
+                self.residual = Some((light, picture));
+            }
+            Told::Photosite { at, found } => {
+                if let Some(taken) = self.taken.as_mut().filter(|taken| taken.at == at) {
+                    taken.found = Some(found);
+                }
+            }
+            Told::MaskSaved => {
+                if let Some(painting) = &mut self.painting {
+                    painting.changed = false;
+                }
+            }
+        }
+    }
+
+    /// The solution that is looked at.
+    pub fn opened(&self) -> Option<&Opened> {
+        self.opened.as_deref()
+    }
+
+    /// A new solution. The same one solved again keeps the place that is seen and the light.
+    fn take(&mut self, opened: Box<Opened>, desk: &mut Desk) {
+        let again = self.opened.as_ref().is_some_and(|old| old.folder == opened.folder);
+        let kept = again.then(|| std::mem::take(&mut self.view));
+        let lamp = again.then(|| self.lamp.clone());
+        let path = std::mem::take(&mut self.path);
+        *self = Self { path, ..Self::default() };
+        self.view = kept.unwrap_or_default();
+        self.lamp = lamp.unwrap_or_else(|| {
+            let mut lamp = Lamp::default();
+            lamp.hang_over(&opened.maps.geometry);
+            lamp
+        });
+        self.opened = Some(opened);
+        desk.go_to(Room::Look);
+    }
+
+    fn nothing_yet(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        widgets::heading(ui, texts::HEADING, texts::WHAT);
+        ui.add_space((ui.available_height() * 0.25).max(theme::GAP));
+        ui.vertical_centered(|ui| {
+            ui.label(RichText::new(texts::NOTHING_YET).size(16.0).weak());
+            ui.add_space(theme::GAP);
+            if ui.button(texts::TO_SCANS).clicked() {
+                desk.go_to(Room::Scans);
+            }
+            ui.add_space(theme::WIDE_GAP);
+            ui.set_max_width(520.0);
+            self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
+                desk.ask(Command::Look(Ask::Open(folder)));
+            });
+        });
+    }
+
+    /// A field for a folder, with a dialogue beside it.
+    fn path_field(
+        &mut self,
+        ui: &mut egui::Ui,
+        name: &str,
+        action: &str,
+        mut open: impl FnMut(PathBuf),
+    ) {
+        ui.horizontal(|ui| {
+            let label = ui.label(name);
+            let width = (ui.available_width() - 190.0).max(60.0);
+            let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
+            ui.add(field).labelled_by(label.id);
+            if ui.button(texts::BROWSE).clicked()
+                && let Some(folder) = rfd::FileDialog::new().pick_folder()
+            {
+                self.path = folder.display().to_string();
+            }
+            let named = !self.path.trim().is_empty();
+            if ui.add_enabled(named, egui::Button::new(action)).clicked() {
+                open(PathBuf::from(self.path.trim()));
+                ui.close();
+            }
+        });
+    }
+
+    /// A solution that is dragged into the window.
+    fn take_dropped(&mut self, ui: &egui::Ui, desk: &mut Desk) {
+        let dropped = ui.input(|input| input.raw.dropped_files.clone());
+        let solution = dropped
+            .into_iter()
+            .map(|file| file.path().to_owned())
+            .find(|folder| folder.join(weavelight::solution::REPORT_JSON).exists());
+        if let Some(folder) = solution {
+            desk.ask(Command::Look(Ask::Open(folder)));
+        }
+    }
+
+    fn keys(&mut self, ui: &egui::Ui) {
+        use egui::{Key, Modifiers};
+        let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
+        if let Some(painting) = &mut self.painting {
+            // The one with more modifiers first: the other would take it too.
+            if pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) {
+                painting.redo();
+            } else if pressed(Modifiers::COMMAND, Key::Z) {
+                painting.undo();
+            }
+        }
+        if ui.ctx().memory(|memory| memory.focused().is_some()) {
+            return;
+        }
+        if pressed(Modifiers::NONE, Key::F) {
+            self.view.fit();
+        }
+        if pressed(Modifiers::NONE, Key::Num1) {
+            self.view.one_to_one(ui.ctx());
+        }
+    }
+
+    fn head(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some(opened) = &self.opened else { return };
+        let (name, about) = (opened.name.clone(), about(opened));
+        let warnings = opened.warnings.join("\n");
+        let surface = opened.maps.surface.clone();
+        ui.add_space(theme::GAP / 2.0);
+        ui.horizontal(|ui| {
+            ui.add(egui::Label::new(RichText::new(name).heading()).truncate());
+            ui.label(RichText::new(about).weak()).on_hover_text(&warnings);
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.menu_button(texts::OPEN_MENU, |ui| {
+                    ui.set_min_width(460.0);
+                    self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
+                        desk.ask(Command::Look(Ask::Open(folder)));
+                    });
+                });
+                ui.menu_button(texts::COMPARE_MENU, |ui| {
+                    ui.set_min_width(460.0);
+                    self.path_field(ui, texts::FOLDER, texts::COMPARE, |folder| {
+                        desk.ask(Command::Look(Ask::Compare(folder, surface.clone())));
+                    });
+                });
+            });
+        });
+        ui.horizontal(|ui| self.tools(ui, desk));
+        ui.add_space(theme::GAP / 2.0);
+    }
+
+    fn tools(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let can_mask = self.can_mask();
+        for (tool, (name, hint)) in
+            [Tool::Hand, Tool::Line, Tool::Brush, Tool::Lasso].into_iter().zip(texts::TOOLS)
+        {
+            let masks = matches!(tool, Tool::Brush | Tool::Lasso);
+            let button = egui::Button::selectable(self.tool == tool, name);
+            let hint = if masks && !can_mask { texts::NO_MASK } else { hint };
+            if ui
+                .add_enabled(!masks || can_mask, button)
+                .on_hover_text(hint)
+                .on_disabled_hover_text(hint)
+                .clicked()
+            {
+                self.tool = tool;
+            }
+        }
+        ui.separator();
+        if ui.button(texts::FIT).on_hover_text(texts::FIT_HINT).clicked() {
+            self.view.fit();
+        }
+        if ui.button(texts::ONE_TO_ONE).on_hover_text(texts::ONE_TO_ONE_HINT).clicked() {
+            self.view.one_to_one(ui.ctx());
+        }
+        if let Some(painting) = &mut self.painting {
+            ui.separator();
+            let [undo, redo] = painting.steps();
+            let button = |name| egui::Button::new(name);
+            if ui.add_enabled(undo, button(texts::UNDO)).on_hover_text("Ctrl+Z").clicked() {
+                painting.undo();
+            }
+            if ui.add_enabled(redo, button(texts::REDO)).on_hover_text("Ctrl+Shift+Z").clicked() {
+                painting.redo();
+            }
+        }
+        let _ = desk;
+    }
+
+    /// A mask belongs to the frames: it needs a capture session whose grid the maps share.
+    fn can_mask(&self) -> bool {
+        self.opened.as_ref().is_some_and(|opened| opened.capture.is_some() && !opened.undistorted)
+    }
+
+    /// Asks for a light's picture or residual where one is shown that is not there.
+    fn await_layers(&mut self, desk: &mut Desk) {
+        let Some(capture) = self.opened.as_ref().and_then(|opened| opened.capture.as_ref()) else {
+            return;
+        };
+        let light = self.lamp.light;
+        if self.awaited.is_some() || desk.is_busy() || !capture.lights.contains(&light) {
+            return;
+        }
+        let there =
+            |of: &Option<(usize, Arc<Pyramid>)>| of.as_ref().is_some_and(|of| of.0 == light);
+        let session = capture.session.clone();
+        if self.layers.shows_frame() && !there(&self.picture) {
+            self.awaited = Some(Awaited::Picture(light));
+            desk.ask(Command::Look(Ask::Picture(session, light)));
+        } else if self.layers.shows_residual() && !there(&self.residual) {
+            self.awaited = Some(Awaited::Residual(light));
+            desk.ask(Command::Look(Ask::Residual(session, light)));
+        }
+    }
+}
+
+/// Size, scale and method in words.
+fn about(opened: &Opened) -> String {
+    let size = texts::size(opened.maps.size());
+    let scale = opened.mm_per_px.map_or_else(String::new, texts::scale);
+    format!("{size}{scale} · {}", opened.method)
+}
+
+/// The worker's part.
+pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
+    work::act(ask, tools, out);
+}

@@ -1,0 +1,190 @@
+//! A solution taken off the disk, ready to be looked at.
+
+use super::slopes::{self, Distribution};
+use super::view::{Geometry, Maps, Pyramid, surface};
+use crate::place::Place;
+use nalgebra::{Point3, UnitVector3, Vector3};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use weavelight::files::{FileError, sha256_of_file};
+use weavelight::instrument::{CalibratedLight, Calibration};
+use weavelight::raster::{Exr, read_exr, read_mask};
+use weavelight::session::{MANIFEST, Session};
+use weavelight::solution::{ALBEDO_EXR, CAMERA_TOML, CONFIDENCE_EXR, NORMAL_EXR, Solution};
+use weavelight_calibration::description::{Camera, Image, Plane};
+
+/// A solution with what belongs to it.
+#[derive(Debug)]
+pub struct Opened {
+    /// Its name: that of its folder.
+    pub name: String,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its maps.
+    pub maps: Maps,
+    /// Size of a pixel, millimetres, where the camera is known.
+    pub mm_per_px: Option<f64>,
+    /// How steep it is.
+    pub slopes: Option<Distribution>,
+    /// Sentences of the solve.
+    pub warnings: Vec<String>,
+    /// How it was solved, as the command line says it.
+    pub method: String,
+    /// Whether the maps lie on a grid without the lens's distortion, which is not the frames' own.
+    pub undistorted: bool,
+    /// The frames that it was solved from, where they are still there.
+    pub capture: Option<Capture>,
+    /// The rig's lights, where they are calibrated.
+    pub lights: Vec<CalibratedLight>,
+}
+
+/// Where a solution comes from.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// The capture session's folder.
+    pub session: PathBuf,
+    /// Lights that have a frame, ascending.
+    pub lights: Vec<usize>,
+    /// What is inside, row by row, where a mask says so.
+    pub mask: Option<Arc<Image<bool>>>,
+    /// Whether it is not any more what the solution was made from.
+    pub changed: bool,
+}
+
+/// Why a solution cannot be looked at.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum OpenError {
+    /// A file is missing or broken.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A picture is missing or broken.
+    #[error(transparent)]
+    Picture(#[from] weavelight::raster::FileError),
+    /// A map lacks a channel.
+    #[error("{path} has no channel {channel}; solve the scan again")]
+    Channel {
+        /// The file.
+        path: String,
+        /// R, G, B or Y.
+        channel: &'static str,
+    },
+    /// Maps of different sizes.
+    #[error("{path} is {found} and normal.exr {expected}; solve the scan again")]
+    Size {
+        /// The file.
+        path: String,
+        /// Its size.
+        found: String,
+        /// That of the normals.
+        expected: String,
+    },
+}
+
+/// Reads a solution. `tell` is told the share done and the step.
+///
+/// # Errors
+/// Where it is no solution, or its maps are broken.
+pub(super) fn open(
+    folder: &Path,
+    place: Option<&Place>,
+    tell: &dyn Fn(f64, &str),
+) -> Result<Opened, OpenError> {
+    tell(0.0, NORMAL_EXR);
+    let solution = Solution::load(folder)?;
+    let surface = read_surface(folder)?;
+    tell(0.5, ALBEDO_EXR);
+    let report = solution.report;
+    let plane = Plane {
+        point_mm: Point3::from(report.plane.point_mm),
+        normal: UnitVector3::new_normalize(Vector3::from(report.plane.normal)),
+    };
+    let geometry = Geometry::new(surface.size(), camera_of(folder)?, plane, 1);
+    let albedo = read_map(folder, ALBEDO_EXR, Some(surface.size()))?;
+    let [r, g, b] = channels(&albedo, &folder.join(ALBEDO_EXR), ["R", "G", "B"])?;
+    let maps = Maps::over(surface, &|k| [r[k], g[k], b[k]], geometry);
+    tell(0.9, "");
+    Ok(Opened {
+        name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        folder: folder.to_owned(),
+        slopes: slopes::of_surface(&maps.surface),
+        maps,
+        mm_per_px: report.mm_per_px,
+        warnings: report.warnings,
+        method: report.method,
+        undistorted: report.undistorted,
+        capture: place.and_then(|place| capture_of(folder, place, &report.inputs)),
+        lights: place
+            .and_then(|place| Calibration::load(&place.calibration()).ok())
+            .map(|calibration| calibration.lights)
+            .unwrap_or_default(),
+    })
+}
+
+/// Normals and expected errors of a solution.
+///
+/// # Errors
+/// As [`open`].
+pub(super) fn read_surface(folder: &Path) -> Result<Arc<Pyramid>, OpenError> {
+    let normal = read_map(folder, NORMAL_EXR, None)?;
+    let size = [normal.width, normal.height];
+    let [x, y, z] = channels(&normal, &folder.join(NORMAL_EXR), ["R", "G", "B"])?;
+    let confidence = read_map(folder, CONFIDENCE_EXR, Some(size))?;
+    let [error] = channels(&confidence, &folder.join(CONFIDENCE_EXR), ["Y"])?;
+    Ok(surface(size, &|k| [x[k], y[k], z[k]], &|k| error[k]))
+}
+
+fn read_map(folder: &Path, name: &str, size: Option<[usize; 2]>) -> Result<Exr, OpenError> {
+    let path = folder.join(name);
+    let map = read_exr(&path)?;
+    let found = [map.width, map.height];
+    let words = |[width, height]: [usize; 2]| format!("{width} x {height}");
+    match size.filter(|size| *size != found) {
+        Some(expected) => Err(OpenError::Size {
+            path: path.display().to_string(),
+            found: words(found),
+            expected: words(expected),
+        }),
+        None => Ok(map),
+    }
+}
+
+fn channels<'a, const N: usize>(
+    map: &'a Exr,
+    path: &Path,
+    names: [&'static str; N],
+) -> Result<[&'a [f32]; N], OpenError> {
+    let missing = names.into_iter().find(|name| map.channel(name).is_none());
+    match missing {
+        Some(channel) => Err(OpenError::Channel { path: path.display().to_string(), channel }),
+        None => Ok(names.map(|name| map.channel(name).unwrap_or_default())),
+    }
+}
+
+/// The camera that the maps' pixels belong to; `None` where the solution has none.
+fn camera_of(folder: &Path) -> Result<Option<Camera>, FileError> {
+    match folder.join(CAMERA_TOML).exists() {
+        true => Ok(Calibration::load(folder)?.camera),
+        false => Ok(None),
+    }
+}
+
+/// The capture session of the solution's name.
+fn capture_of(
+    folder: &Path,
+    place: &Place,
+    inputs: &[weavelight::files::Input],
+) -> Option<Capture> {
+    let session = place.scans().join(folder.file_name()?);
+    let read = Session::load(&session).ok()?;
+    let mut lights: Vec<usize> = read.frames.iter().filter_map(|frame| frame.light).collect();
+    lights.sort_unstable();
+    lights.dedup();
+    let hash = sha256_of_file(&session.join(MANIFEST)).ok();
+    let made_from = inputs.iter().find(|input| input.name == MANIFEST);
+    Some(Capture {
+        mask: read.mask_path().and_then(|path| read_mask(&path).ok()).map(Arc::new),
+        changed: made_from.is_some_and(|input| Some(&input.sha256) != hash.as_ref()),
+        session,
+        lights,
+    })
+}

@@ -1,0 +1,168 @@
+//! Maps to look at: panned and zoomed to single photosites, under any light. A widget that any room can show.
+//!
+//! [`MapView::show`] draws [`Maps`] as an [`Appearance`] says. Pictures lie in main memory as pyramids of half-precision texels;
+//! of these only the tiles that are seen go to the graphics card, a few a frame.
+
+mod appearance;
+mod geometry;
+mod gpu;
+mod maps;
+mod pool;
+mod pyramid;
+pub mod scales;
+pub mod shade;
+mod viewport;
+
+pub use appearance::{Appearance, Compose, Mode, Scales, Side, lamp_at, sun};
+pub use geometry::Geometry;
+pub use gpu::install;
+pub use maps::{Maps, Sample, normal_of, picture, surface};
+pub use pool::TILE_BYTES;
+pub use pyramid::{Pyramid, Texel};
+pub use viewport::Viewport;
+
+use crate::texts::look as texts;
+use eframe::egui::{self, PointerButton, Rect, Response, Role, Sense, WidgetInfo};
+use eframe::egui_wgpu::Callback;
+
+/// What a view remembers: which part is seen.
+#[derive(Clone, Debug, Default)]
+pub struct MapView {
+    viewport: Option<Viewport>,
+    /// Which maps it belongs to.
+    size: [usize; 2],
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Canvas<'a> {
+    /// The maps.
+    pub maps: &'a Maps,
+    /// How they are shown.
+    pub appearance: &'a Appearance,
+    /// What is drawn, in words, for those who do not see it.
+    pub name: &'a str,
+    /// Whether dragging with the first button pans; where not, only the others do.
+    pub drag_pans: bool,
+}
+
+/// Where things are on the screen.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// What the mouse does.
+    pub response: Response,
+    /// Where.
+    pub rect: Rect,
+    /// Pan and zoom.
+    pub viewport: Viewport,
+}
+
+impl Shown {
+    /// Pixel coordinates under the mouse; centre of the first pixel: 0, 0.
+    pub fn pixel_under_mouse(&self) -> Option<[f64; 2]> {
+        let at = self.response.hover_pos().or(self.response.interact_pointer_pos())?;
+        Some(self.viewport.pixel_at(at, self.rect))
+    }
+}
+
+impl MapView {
+    /// All of it again, the next time it is shown.
+    pub fn fit(&mut self) {
+        self.viewport = None;
+    }
+
+    /// One pixel of the picture per pixel of the screen.
+    pub fn one_to_one(&mut self, ctx: &egui::Context) {
+        let centre = match &self.viewport {
+            Some(viewport) => viewport.centre,
+            None => self.size.map(|length| length as f64 / 2.0),
+        };
+        self.viewport = Some(Viewport { centre, zoom: 1.0 / ctx.pixels_per_point() });
+    }
+
+    /// Goes to a place: pixels from the top left corner, points per pixel.
+    pub fn go_to(&mut self, viewport: Viewport) {
+        self.viewport = Some(viewport);
+    }
+
+    /// Pan and zoom, once shown.
+    pub fn viewport(&self) -> Option<Viewport> {
+        self.viewport
+    }
+
+    /// Draws in all that is left of `ui`; wheel, pinch and drag act.
+    pub fn show(&mut self, ui: &mut egui::Ui, canvas: &Canvas) -> Shown {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, canvas.name));
+        let size = canvas.maps.size();
+        if self.size != size {
+            (self.size, self.viewport) = (size, None);
+        }
+        let mut viewport = self.viewport.unwrap_or_else(|| Viewport::fit(size, rect));
+        let moved = navigate(&mut viewport, ui, &response, (size, rect), canvas.drag_pans);
+        if moved || self.viewport.is_some() {
+            self.viewport = Some(viewport);
+        }
+        paint(ui, rect, &response, viewport, canvas);
+        Shown { response, rect, viewport }
+    }
+}
+
+/// Wheel and pinch zoom, dragging pans. True where something moved.
+fn navigate(
+    viewport: &mut Viewport,
+    ui: &egui::Ui,
+    response: &Response,
+    (size, rect): ([usize; 2], Rect),
+    drag_pans: bool,
+) -> bool {
+    const POINTS_PER_DOUBLING: f32 = 240.0;
+    let before = *viewport;
+    let pans = |button| response.dragged_by(button);
+    if pans(PointerButton::Middle)
+        || pans(PointerButton::Secondary)
+        || (drag_pans && pans(PointerButton::Primary))
+    {
+        viewport.pan(response.drag_delta(), size);
+    }
+    if let Some(mouse) = response.hover_pos() {
+        let (wheel, pinch, shift) = ui.input(|input| {
+            (input.smooth_scroll_delta.y, input.zoom_delta(), input.modifiers.shift)
+        });
+        let factor = if shift { 1.0 } else { (wheel / POINTS_PER_DOUBLING).exp2() * pinch };
+        if factor != 1.0 {
+            viewport.zoom_at(mouse, factor, size, rect);
+        }
+    }
+    *viewport != before
+}
+
+fn paint(ui: &egui::Ui, rect: Rect, response: &Response, viewport: Viewport, canvas: &Canvas) {
+    let ground = ui.visuals().extreme_bg_color;
+    ui.painter().rect_filled(rect, 0.0, ground);
+    let Some(renderer) = gpu::renderer(ui.ctx()) else {
+        let font = egui::TextStyle::Body.resolve(ui.style());
+        let color = ui.visuals().text_color();
+        let at = rect.center();
+        ui.painter().text(at, egui::Align2::CENTER_CENTER, texts::NO_GRAPHICS, font, color);
+        return;
+    };
+    let screen = (rect.size(), ui.ctx().pixels_per_point());
+    let uniform = shade::uniform(
+        canvas.appearance,
+        &viewport,
+        &canvas.maps.geometry,
+        screen,
+        ground,
+        renderer.encoding_target,
+    );
+    let frame = gpu::Frame {
+        id: response.id,
+        ctx: ui.ctx().clone(),
+        pictures: gpu::Frame::pictures(canvas),
+        viewport,
+        screen,
+        uniform: Box::new(uniform),
+    };
+    ui.painter().with_clip_rect(rect).add(Callback::new_paint_callback(rect, frame));
+}

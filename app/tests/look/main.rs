@@ -1,0 +1,131 @@
+//! The Look room on a small scan of the simulated rig: opened, relit, split, measured, masked and solved again.
+
+mod bench;
+mod pictures;
+mod shading;
+
+use bench::{Bench, SOLUTION};
+use eframe::egui::{self, Key, Modifiers, pos2};
+use egui_kittest::kittest::Queryable;
+use weavelight::solution::Report;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+/// Where the cloth is at this size.
+const CLOTH: [egui::Pos2; 2] = [pos2(400.0, 300.0), pos2(700.0, 500.0)];
+
+#[test]
+fn a_lamp_is_dragged_over_the_cloth() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    let bright_at = |window: &mut bench::Window, at: egui::Pos2| {
+        let picture = window.render().unwrap();
+        let around = (0..81).map(|k| (at.x as u32 + 2 * (k % 9), at.y as u32 + 2 * (k / 9)));
+        around.map(|(x, y)| u32::from(picture.get_pixel(x, y)[1])).sum::<u32>()
+    };
+    window.drag_at(CLOTH[0]);
+    window.run();
+    window.hover_at(CLOTH[1]);
+    window.run();
+    window.drop_at(CLOTH[1]);
+    window.run();
+    let there = [bright_at(&mut window, CLOTH[0]), bright_at(&mut window, CLOTH[1])];
+    assert!(there[1] > there[0], "the lamp is at the second place: {there:?}");
+    window.drag_at(CLOTH[1]);
+    window.run();
+    window.hover_at(CLOTH[0]);
+    window.run();
+    window.drop_at(CLOTH[0]);
+    window.run();
+    let back = [bright_at(&mut window, CLOTH[0]), bright_at(&mut window, CLOTH[1])];
+    assert!(back[0] > back[1] && back[0] > there[0], "and back at the first: {back:?}");
+}
+
+#[test]
+fn a_photosite_says_which_lights_it_rests_on() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Light);
+    window.hover_at(CLOTH[0]);
+    window.run();
+    window.get_by_label("Loupe");
+    window.drag_at(CLOTH[0]);
+    window.drop_at(CLOTH[0]);
+    bench::wait(&mut window, "its lights", |window| {
+        window.query_all_by_label_contains("used").next().is_some()
+    });
+    let lights = window.query_all_by_label_contains("used").count();
+    let others = ["shadow", "highlight", "clipped"];
+    let others: usize =
+        others.iter().map(|why| window.query_all_by_label_contains(why).count()).sum();
+    assert!(lights >= 3 && lights + others == 10, "{lights} used, {others} not");
+}
+
+#[test]
+fn a_line_is_measured_and_put_away() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    window.get_by_label("Line").click();
+    window.run();
+    bench::drag(&mut window, CLOTH);
+    window.get_by_label("Along the line");
+    window.get_by_label_contains("mm from where it began");
+    window.get_by_label("Close").click();
+    window.run();
+    assert!(window.query_by_label("Along the line").is_none());
+}
+
+#[test]
+fn a_mask_is_painted_undone_saved_and_solved_with() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    let solved =
+        |bench: &Bench| Report::read(&bench.solution().join("report.json")).unwrap().solved;
+    let before = solved(&bench);
+    window.get_by_label("Brush").click();
+    window.run();
+    window.get_by_label("Leave out").click();
+    window.run();
+    bench::drag(&mut window, CLOTH);
+    // Undone and redone with the keys, and once more with the buttons.
+    window.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    window.run();
+    window.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
+    window.run();
+    window.get_by_label("Undo").click();
+    window.run();
+    window.get_by_label("Redo").click();
+    window.run();
+    window.get_by_label("Save and solve again").click();
+    bench::wait(&mut window, "the new solution", |_| solved(&bench) < before);
+    let manifest = std::fs::read_to_string(bench.scan().join("session.toml")).unwrap();
+    assert!(manifest.contains("mask = \"mask.png\""), "{manifest}");
+    let left = std::fs::read_dir(bench.scan()).unwrap().map(|e| e.unwrap().file_name());
+    let left: Vec<_> = left.filter(|name| name.to_string_lossy().starts_with('.')).collect();
+    assert!(left.is_empty(), "{left:?} stayed");
+}
+
+#[test]
+fn another_solution_is_compared() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    let other = bench.solve_again("plain", weavelight::photometry::Method::LeastSquares);
+    window.get_by_label("Compare with…").click();
+    window.run();
+    bench::enter_folder(&mut window, &other);
+    window.get_by_label("Compare").click();
+    bench::wait(&mut window, "the angles", |window| {
+        window.query_by_label("Against plain").is_some()
+    });
+    window.get_by_label("Angle between the normals");
+}
+
+#[test]
+fn what_is_no_solution_is_told_with_its_remedy() {
+    let bench = Bench::new();
+    let mut window = bench.empty(SIZE, egui::Theme::Dark);
+    bench::enter_folder(&mut window, &bench.scan());
+    window.get_by_label("Open").click();
+    bench::wait(&mut window, "a problem", |window| !window.state().desk().problems.is_empty());
+    window.run();
+    window.get_by_label_contains("report.json");
+    assert!(window.query_by_label(SOLUTION).is_none());
+}

@@ -1,0 +1,92 @@
+//! Pictures of the room at two sizes and in both themes.
+
+use super::bench::{self, Bench};
+use eframe::egui::{self, pos2};
+use egui_kittest::kittest::Queryable;
+
+const SIZES: [[f32; 2]; 2] = [[1280.0, 800.0], [960.0, 640.0]];
+const THEMES: [(egui::Theme, &str); 2] =
+    [(egui::Theme::Dark, "dark"), (egui::Theme::Light, "light")];
+
+/// A picture in every size and theme, after `act`.
+fn check(
+    name: &str,
+    open: fn(&Bench, [f32; 2], egui::Theme) -> bench::Window,
+    act: impl Fn(&mut bench::Window),
+) {
+    let bench = Bench::new();
+    let mut results = egui_kittest::SnapshotResults::new();
+    for size in SIZES {
+        for (theme, theme_name) in THEMES {
+            let mut window = open(&bench, size, theme);
+            act(&mut window);
+            window.remove_cursor();
+            window.run();
+            // Tiles come to the card when they are first drawn.
+            window.render().unwrap();
+            window.run();
+            results.add(
+                window.try_snapshot(format!("look-{name}-{}x{}-{theme_name}", size[0], size[1])),
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_open_yet() {
+    check("empty", Bench::empty, |_| {});
+}
+
+#[test]
+fn under_a_lamp() {
+    check("lamp", Bench::look, |_| {});
+}
+
+#[test]
+fn a_light_beside_its_frame_with_a_photosite() {
+    check("frame", Bench::look, |window| {
+        window.get_by_label("Rig's lights").click();
+        window.run();
+        window.get_by_label("Beside its captured frame").click();
+        bench::wait(window, "the frame", |window| {
+            let waiting = window.query_by_label("Reading the frames…").is_some();
+            !waiting && !window.state().desk().is_busy()
+        });
+        window.run();
+        let cloth = pos2(360.0, 330.0);
+        window.drag_at(cloth);
+        window.drop_at(cloth);
+        bench::wait(window, "its lights", |window| {
+            window.query_all_by_label_contains("used").next().is_some()
+        });
+    });
+}
+
+#[test]
+fn slopes_with_a_line_through_them() {
+    check("line", Bench::look, |window| {
+        choose(window, "Map", "Slope");
+        window.get_by_label("Line").click();
+        window.run();
+        bench::drag(window, [pos2(300.0, 250.0), pos2(460.0, 330.0)]);
+    });
+}
+
+#[test]
+fn a_mask_being_painted() {
+    check("mask", Bench::look, |window| {
+        choose(window, "Map", "Expected error");
+        window.get_by_label("Brush").click();
+        window.run();
+        window.get_by_label("Leave out").click();
+        window.run();
+        bench::drag(window, [pos2(300.0, 250.0), pos2(460.0, 330.0)]);
+    });
+}
+
+fn choose(window: &mut bench::Window, list: &str, entry: &str) {
+    window.get_by_role_and_label(egui::accesskit::Role::ComboBox, list).click();
+    window.run();
+    window.get_by_label(entry).click();
+    window.run();
+}
