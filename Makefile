@@ -7,7 +7,7 @@
 # make kills   the program killed two hundred times while it scans, at the simulated board
 # make scan-timing   wall time of a scan of full-size frames beside exposure and transfer
 # make tether-timing the same through libgphoto2, with a camera that speaks PTP/IP
-# make bench   run time against error and against touching the bytes once
+# make bench   run time against error and against touching the bytes once; the window's frames
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
 
@@ -60,6 +60,7 @@ install: build
 
 bench: packages-all
 	cargo bench --locked --all-features
+	cargo bench --locked -p weavelight-app --bench frame
 	cargo run --release --locked --quiet --all-features -- bench --out bench --curves
 
 # Fifteen minutes with the real firmware over a bad wire; make soak SOAK_S=60 for a short one.

@@ -95,6 +95,7 @@ pub const TOO_BRIGHT: &str = "highlight";
 
 pub const SLOPES: &str = "Slopes";
 pub const PROFILE: &str = "Along the line";
+pub const DRAW_A_LINE: &str = "Draw a line over the cloth.";
 pub const SLOPE_ALONG: &str = "Slope, degrees";
 pub const HEIGHT_ALONG: &str = "Height, mm";
 pub const CLOSE: &str = "Close";

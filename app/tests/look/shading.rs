@@ -30,7 +30,8 @@ impl eframe::App for Bare {
             name: "cloth",
             drag_pans: true,
         };
-        self.view.show(ui, &canvas);
+        let bare = egui::CentralPanel::default().frame(egui::Frame::new());
+        bare.show(ui, |ui| self.view.show(ui, &canvas));
     }
 }
 

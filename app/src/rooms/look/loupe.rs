@@ -4,6 +4,7 @@ use super::Look;
 use super::view::{Maps, Sample, shade};
 use crate::texts::look as texts;
 use crate::theme::{self, meaning};
+use crate::widgets::Sign;
 use eframe::egui::{
     self, Color32, Grid, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
 };
@@ -123,21 +124,25 @@ fn table(ui: &mut Ui, photosite: &Photosite) {
             ui.label(RichText::new(sample.light.to_string()).monospace().size(12.0));
             ui.label(RichText::new(number(sample.measured)).monospace().size(12.0));
             ui.label(RichText::new(number(sample.predicted)).monospace().size(12.0));
-            let (sign, color, text) = verdict(ui, sample.part);
-            let verdict = format!("{sign} {text}");
-            ui.label(RichText::new(verdict).color(color).size(12.0));
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 2.0;
+                let (sign, text) = verdict(sample.part);
+                if let Some(sign) = sign {
+                    sign.ui(ui);
+                }
+                ui.label(RichText::new(text).size(12.0));
+            });
             ui.end_row();
         }
     });
 }
 
-fn verdict(ui: &Ui, part: Part) -> (&'static str, Color32, &'static str) {
-    let plain = ui.visuals().text_color();
+fn verdict(part: Part) -> (Option<Sign>, &'static str) {
     match part {
-        Part::Used => ("✔", plain, texts::USED),
-        Part::Unusable => ("✖", meaning::BAD, texts::CLIPPED),
-        Part::TooDark => ("▼", meaning::WARNING, texts::TOO_DARK),
-        Part::TooBright => ("▲", meaning::WARNING, texts::TOO_BRIGHT),
-        Part::Unsolved => ("–", plain, texts::UNSOLVED),
+        Part::Used => (None, texts::USED),
+        Part::Unusable => (Some(Sign::Bad), texts::CLIPPED),
+        Part::TooDark => (Some(Sign::Warning), texts::TOO_DARK),
+        Part::TooBright => (Some(Sign::Warning), texts::TOO_BRIGHT),
+        Part::Unsolved => (None, texts::UNSOLVED),
     }
 }

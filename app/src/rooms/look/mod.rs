@@ -161,7 +161,6 @@ struct Taken {
 impl Look {
     /// Draws the room.
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        self.take_dropped(ui, desk);
         if self.opened.is_none() {
             return self.nothing_yet(ui, desk);
         }
@@ -171,7 +170,7 @@ impl Look {
             .exact_size(280.0)
             .resizable(false)
             .show(ui, |ui| self.side(ui, desk));
-        if self.profile.is_some() {
+        if self.profile.is_some() || self.tool == Tool::Line {
             egui::Panel::bottom("look profile").exact_size(190.0).show(ui, |ui| self.plot(ui));
         }
         let frame = egui::Frame::new().inner_margin(0);
@@ -232,15 +231,20 @@ impl Look {
 
     fn nothing_yet(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         widgets::heading(ui, texts::HEADING, texts::WHAT);
-        ui.add_space((ui.available_height() * 0.25).max(theme::GAP));
+        ui.add_space((ui.available_height() * 0.22).max(theme::GAP));
         ui.vertical_centered(|ui| {
             ui.label(RichText::new(texts::NOTHING_YET).size(16.0).weak());
             ui.add_space(theme::GAP);
-            if ui.button(texts::TO_SCANS).clicked() {
+            let size = egui::vec2(180.0, theme::BIG);
+            if widgets::primary(ui, texts::TO_SCANS, size, true).clicked() {
                 desk.go_to(Room::Scans);
             }
-            ui.add_space(theme::WIDE_GAP);
-            ui.set_max_width(520.0);
+        });
+        ui.add_space(2.0 * theme::WIDE_GAP);
+        let width = ui.available_width().min(620.0);
+        ui.horizontal(|ui| {
+            ui.add_space((ui.available_width() - width) / 2.0);
+            ui.set_max_width(width);
             self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
                 desk.ask(Command::Look(Ask::Open(folder)));
             });
@@ -271,18 +275,6 @@ impl Look {
                 ui.close();
             }
         });
-    }
-
-    /// A solution that is dragged into the window.
-    fn take_dropped(&mut self, ui: &egui::Ui, desk: &mut Desk) {
-        let dropped = ui.input(|input| input.raw.dropped_files.clone());
-        let solution = dropped
-            .into_iter()
-            .map(|file| file.path().to_owned())
-            .find(|folder| folder.join(weavelight::solution::REPORT_JSON).exists());
-        if let Some(folder) = solution {
-            desk.ask(Command::Look(Ask::Open(folder)));
-        }
     }
 
     fn keys(&mut self, ui: &egui::Ui) {
@@ -331,11 +323,11 @@ impl Look {
                 });
             });
         });
-        ui.horizontal(|ui| self.tools(ui, desk));
+        ui.horizontal(|ui| self.tools(ui));
         ui.add_space(theme::GAP / 2.0);
     }
 
-    fn tools(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn tools(&mut self, ui: &mut egui::Ui) {
         let can_mask = self.can_mask();
         for (tool, (name, hint)) in
             [Tool::Hand, Tool::Line, Tool::Brush, Tool::Lasso].into_iter().zip(texts::TOOLS)
@@ -370,7 +362,6 @@ impl Look {
                 painting.redo();
             }
         }
-        let _ = desk;
     }
 
     /// A mask belongs to the frames: it needs a capture session whose grid the maps share.

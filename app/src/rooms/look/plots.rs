@@ -1,6 +1,6 @@
 //! Histogram of slopes and the profile along a line.
 
-use super::Look;
+use super::{Look, Tool};
 use super::slopes::Distribution;
 use crate::texts::look as texts;
 use crate::theme::meaning;
@@ -43,7 +43,11 @@ pub(super) fn histogram(ui: &mut Ui, name: &str, of: &Distribution) {
 impl Look {
     /// What lies along the line that was drawn.
     pub(super) fn plot(&mut self, ui: &mut Ui) {
-        let Some(profile) = &self.profile else { return };
+        let Some(profile) = &self.profile else {
+            ui.label(RichText::new(texts::PROFILE).strong());
+            ui.label(RichText::new(texts::DRAW_A_LINE).weak());
+            return;
+        };
         let mut put_away = false;
         ui.horizontal(|ui| {
             ui.label(RichText::new(texts::PROFILE).strong());
@@ -55,23 +59,25 @@ impl Look {
         });
         let (slope, height) = (profile.slope.clone(), profile.height.clone());
         let half = (ui.available_width() - ui.spacing().item_spacing.x) / 2.0;
-        ui.horizontal(|ui| {
-            curve(ui, half, texts::SLOPE_ALONG, slope);
-            curve(ui, half, texts::HEIGHT_ALONG, height);
+        // A line of text above each.
+        let size = vec2(half, ui.available_height() - 24.0);
+        ui.horizontal_top(|ui| {
+            curve(ui, size, texts::SLOPE_ALONG, slope);
+            curve(ui, size, texts::HEIGHT_ALONG, height);
         });
         if put_away {
-            (self.line, self.profile) = (None, None);
+            (self.line, self.profile, self.tool) = (None, None, Tool::Hand);
         }
     }
 }
 
-fn curve(ui: &mut Ui, width: f32, name: &'static str, points: Vec<[f64; 2]>) {
+fn curve(ui: &mut Ui, size: egui::Vec2, name: &'static str, points: Vec<[f64; 2]>) {
     ui.vertical(|ui| {
-        ui.set_width(width);
+        ui.set_width(size.x);
         ui.label(RichText::new(name).small().weak());
         let plot = Plot::new(name)
-            .width(width)
-            .height(ui.available_height())
+            .width(size.x)
+            .height(size.y)
             .allow_scroll(false)
             .allow_zoom(false)
             .allow_drag(false)

@@ -47,8 +47,7 @@ impl Look {
 
     fn layer_choice(&mut self, ui: &mut Ui, k: usize, name: &str) {
         ui.horizontal(|ui| {
-            let label =
-                ui.add_sized([44.0, 20.0], egui::Label::new(name).halign(egui::Align::LEFT));
+            let label = ui.label(name);
             let mut chosen = self.layers.sides[k];
             let width = ui.available_width() - 8.0;
             let choice = ComboBox::from_id_salt(("layer", k)).width(width);

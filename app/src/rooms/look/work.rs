@@ -3,7 +3,7 @@
 use super::opened::{self, OpenError};
 use super::view::{Pyramid, picture};
 use super::{Ask, Told, slopes};
-use crate::settings::{MethodName, SolveSettings};
+use crate::settings::SolveSettings;
 use crate::texts::look as texts;
 use crate::worker::{Outbox, Tools, Update};
 use std::path::{Path, PathBuf};
@@ -13,9 +13,7 @@ use weavelight::photometry::Method;
 use weavelight::raster::write_png_grey8;
 use weavelight::report::page_of_solve;
 use weavelight::session::Session;
-use weavelight::solve::{
-    Grid, NormalY, Options, Rows, Scene, Shown, SolveError, load_scene, run_with_page,
-};
+use weavelight::solve::{Rows, Scene, Shown, SolveError, load_scene, run_with_page};
 use weavelight_calibration::description::Image;
 
 /// The frames that were looked at last, decoded.
@@ -166,7 +164,7 @@ fn solve(session: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbo
     let Some(place) = &tools.place else { return };
     let name = session.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let solution = place.solution(session);
-    let options = options(settings, session, &place.calibration(), &solution);
+    let options = settings.options(session, &place.calibration(), &solution);
     let solved = out.job(&texts::solving(&name), || {
         let page = |shown: &Shown| page_of_solve(shown, None);
         run_with_page(&options, &|state| out.tick(state.share(), state.stage.what()), Some(&page))
@@ -174,16 +172,4 @@ fn solve(session: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbo
     if solved.is_ok() {
         open(&solution, tools, out);
     }
-}
-
-fn options(settings: SolveSettings, session: &Path, calibration: &Path, to: &Path) -> Options {
-    let mut options = Options::new(session, calibration, to);
-    options.method = match settings.method {
-        MethodName::Auto => Method::Auto,
-        MethodName::LeastSquares => Method::LeastSquares,
-        MethodName::Robust => Method::Robust,
-    };
-    options.grid = if settings.undistort { Grid::Undistorted } else { Grid::Sensor };
-    options.normal_y = if settings.normal_y_down { NormalY::Down } else { NormalY::Up };
-    options
 }

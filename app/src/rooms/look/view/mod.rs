@@ -22,7 +22,7 @@ pub use pyramid::{Pyramid, Texel};
 pub use viewport::Viewport;
 
 use crate::texts::look as texts;
-use eframe::egui::{self, PointerButton, Rect, Response, Role, Sense, WidgetInfo};
+use eframe::egui::{self, Color32, Id, PointerButton, Rect, Response, Role, Sense, WidgetInfo};
 use eframe::egui_wgpu::Callback;
 
 /// What a view remembers: which part is seen.
@@ -92,7 +92,10 @@ impl MapView {
 
     /// Draws in all that is left of `ui`; wheel, pinch and drag act.
     pub fn show(&mut self, ui: &mut egui::Ui, canvas: &Canvas) -> Shown {
-        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let (_, rect) = ui.allocate_space(ui.available_size());
+        // Its own name: what else the room shows must not make another view of it in the middle of a drag.
+        let id = Id::unique(("map view", canvas.name));
+        let response = ui.interact(rect, id, Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, canvas.name));
         let size = canvas.maps.size();
         if self.size != size {
@@ -138,7 +141,8 @@ fn navigate(
 }
 
 fn paint(ui: &egui::Ui, rect: Rect, response: &Response, viewport: Viewport, canvas: &Canvas) {
-    let ground = ui.visuals().extreme_bg_color;
+    // Neutral, and not so bright that it blinds the eye to the cloth.
+    let ground = Color32::from_gray(if ui.visuals().dark_mode { 20 } else { 200 });
     ui.painter().rect_filled(rect, 0.0, ground);
     let Some(renderer) = gpu::renderer(ui.ctx()) else {
         let font = egui::TextStyle::Body.resolve(ui.style());

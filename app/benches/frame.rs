@@ -1,0 +1,235 @@
+//! The window's own time per frame on 16 megapixels: panning at one pixel to one, panning from afar, and dragging a lamp.
+//!
+//! Own time is everything that the window does on the processor: laying out the Look room, tessellating, sending tiles,
+//! recording the pass. What the graphics driver then does is told beside it; with a software driver that is the processor too.
+
+#![allow(clippy::print_stdout, reason = "a benchmark tells its figures")]
+#![allow(clippy::unwrap_used, reason = "a benchmark that cannot draw has failed")]
+
+use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
+use eframe::egui_wgpu::{
+    RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup, wgpu,
+};
+use std::time::{Duration, Instant};
+use weavelight_app::desk::Desk;
+use weavelight_app::rooms::look::view::{Geometry, Maps, install};
+use weavelight_app::rooms::look::{Look, Opened, Told, slopes};
+use weavelight_app::settings::Settings;
+use weavelight_calibration::description::Plane;
+
+/// The reference camera's frame.
+const SIZE_PX: [usize; 2] = [4928, 3264];
+/// The window, pixels.
+const WINDOW: [u32; 2] = [1920, 1080];
+/// Frames of each kind.
+const FRAMES: usize = 300;
+
+/// A window without a screen.
+struct Window {
+    ctx: egui::Context,
+    state: RenderState,
+    target: wgpu::TextureView,
+    look: Look,
+    desk: Desk,
+    frame: usize,
+}
+
+/// What one frame took.
+struct Took {
+    own: Duration,
+    all: Duration,
+}
+
+fn main() {
+    // Test runners ask what there is.
+    if std::env::args().any(|argument| argument == "--list") {
+        return;
+    }
+    let before = memory_mib("VmRSS");
+    let maps = maps();
+    println!(
+        "{} x {} px: maps {:.0} MiB in main memory ({:.0} MiB of the process)",
+        SIZE_PX[0],
+        SIZE_PX[1],
+        maps.bytes() as f64 / f64::from(1 << 20),
+        memory_mib("VmRSS") - before
+    );
+    let mut window = Window::new(maps);
+    println!("window {} x {} px, renderer: {}", WINDOW[0], WINDOW[1], window.renderer());
+    window.settle();
+    let middle = pos2(700.0, 500.0);
+    window.measure("lamp, all of it", middle, PointerButton::Primary);
+    window.measure("panning, all of it", middle, PointerButton::Secondary);
+    window.frame(vec![key(Key::Num1)]);
+    window.measure("panning, 1 : 1", middle, PointerButton::Secondary);
+    window.measure("lamp, 1 : 1", middle, PointerButton::Primary);
+    println!("most memory of the process: {:.0} MiB", memory_mib("VmHWM"));
+}
+
+/// A weave.
+fn maps() -> Maps {
+    let [width, _] = SIZE_PX;
+    let normal = move |k: usize| {
+        let (x, y) = ((k % width) as f32, (k / width) as f32);
+        let (a, b) = (0.5 * (0.31 * x).sin(), 0.5 * (0.27 * y).sin());
+        let length = (a * a + b * b + 1.0).sqrt();
+        [a / length, b / length, 1.0 / length]
+    };
+    let albedo = move |k: usize| [0.6, 0.5, 0.3 + 0.2 * ((k % width) as f32 * 0.05).sin()];
+    let geometry = Geometry::new(SIZE_PX, None, Plane::table(), 1);
+    Maps::new(geometry, &normal, &|_| 0.5, &albedo)
+}
+
+impl Window {
+    fn new(maps: Maps) -> Self {
+        let ctx = egui::Context::default();
+        let state = render_state();
+        install(&ctx, Some(&state));
+        let settings = Settings::load_from(std::path::Path::new("none"));
+        weavelight_app::theme::apply(&ctx, &settings);
+        let (mut look, mut desk) = (Look::default(), Desk::new(settings));
+        let opened = Opened {
+            name: "weave".to_owned(),
+            folder: "weave".into(),
+            slopes: slopes::of_surface(&maps.surface),
+            maps,
+            mm_per_px: None,
+            warnings: Vec::new(),
+            method: "auto".to_owned(),
+            undistorted: false,
+            capture: None,
+            lights: Vec::new(),
+        };
+        look.hear(Told::Opened(Box::new(opened)), &mut desk);
+        let target = target(&state);
+        Self { ctx, state, target, look, desk, frame: 0 }
+    }
+
+    fn renderer(&self) -> String {
+        let info = self.state.adapter.get_info();
+        format!("{} ({:?}, {:?})", info.name, info.backend, info.device_type)
+    }
+
+    /// Until every tile that is seen is there.
+    fn settle(&mut self) {
+        (0..40).for_each(|_| {
+            self.frame(Vec::new());
+        });
+    }
+
+    /// Drags in circles, and tells what the frames took.
+    fn measure(&mut self, name: &str, middle: Pos2, button: PointerButton) {
+        self.settle();
+        let pressed = |pressed| Event::PointerButton {
+            pos: middle,
+            button,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        self.frame(vec![Event::PointerMoved(middle), pressed(true)]);
+        let mut took: Vec<Took> = (0..FRAMES)
+            .map(|k| {
+                let angle = k as f32 * 0.05;
+                let at = middle + 300.0 * vec2(angle.cos() - 1.0, angle.sin());
+                self.frame(vec![Event::PointerMoved(at)])
+            })
+            .collect();
+        self.frame(vec![pressed(false)]);
+        let mut figures = |of: fn(&Took) -> Duration| {
+            took.sort_by_key(of);
+            let ms = |k: usize| of(&took[k]).as_secs_f64() * 1e3;
+            (ms(FRAMES / 2), ms(FRAMES * 99 / 100), ms(FRAMES - 1))
+        };
+        let (own, all) = (figures(|took| took.own), figures(|took| took.all));
+        println!(
+            "{name:20} own time: median {:5.2} ms, 99th percentile {:5.2} ms, most {:5.2} ms; with the driver: {:6.1} / {:6.1} ms",
+            own.0, own.1, own.2, all.0, all.1
+        );
+    }
+
+    fn frame(&mut self, events: Vec<Event>) -> Took {
+        let started = Instant::now();
+        self.frame += 1;
+        let size = vec2(WINDOW[0] as f32, WINDOW[1] as f32);
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, size)),
+            time: Some(self.frame as f64 / 60.0),
+            events,
+            ..RawInput::default()
+        };
+        let (look, desk) = (&mut self.look, &mut self.desk);
+        let output = self.ctx.run_ui(input, |ui| look.ui(ui, desk));
+        let shapes = self.ctx.tessellate(output.shapes, output.pixels_per_point);
+        let screen = ScreenDescriptor { size_in_pixels: WINDOW, pixels_per_point: 1.0 };
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        let mut renderer = self.state.renderer.write();
+        for (id, deltas) in &output.textures_delta.set {
+            deltas.iter().for_each(|delta| renderer.update_texture(device, queue, *id, delta));
+        }
+        let mut encoder = device.create_command_encoder(&Default::default());
+        let mut buffers =
+            renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: &self.target,
+            resolve_target: None,
+            ops: wgpu::Operations::default(),
+            depth_slice: None,
+        };
+        let mut pass = encoder
+            .begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(attachment)],
+                ..Default::default()
+            })
+            .forget_lifetime();
+        renderer.render(&mut pass, &shapes, &screen);
+        drop(pass);
+        buffers.push(encoder.finish());
+        let own = started.elapsed();
+        queue.submit(buffers);
+        device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+        Took { own, all: started.elapsed() }
+    }
+}
+
+fn key(key: Key) -> Event {
+    Event::Key {
+        key,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::NONE,
+    }
+}
+
+fn render_state() -> RenderState {
+    let setup = WgpuSetup::CreateNew(eframe::egui_wgpu::WgpuSetupCreateNew::without_display_handle());
+    let configuration =
+        WgpuConfiguration { wgpu_setup: setup.clone(), ..WgpuConfiguration::default() };
+    pollster::block_on(async {
+        let instance = setup.new_instance().await;
+        RenderState::create(&configuration, &instance, None, RendererOptions::default()).await
+    })
+    .unwrap()
+}
+
+fn target(state: &RenderState) -> wgpu::TextureView {
+    let texture = state.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: WINDOW[0], height: WINDOW[1], depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: state.target_format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    texture.create_view(&Default::default())
+}
+
+/// A line of this process's status; 0 where the system tells none.
+fn memory_mib(name: &str) -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'));
+    let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<f64>().ok());
+    kib.unwrap_or(0.0) / 1024.0
+}
