@@ -167,8 +167,7 @@ impl Window {
             deltas.iter().for_each(|delta| renderer.update_texture(device, queue, *id, delta));
         }
         let mut encoder = device.create_command_encoder(&Default::default());
-        let mut buffers =
-            renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
+        let mut buffers = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
         let attachment = wgpu::RenderPassColorAttachment {
             view: &self.target,
             resolve_target: None,
@@ -192,17 +191,12 @@ impl Window {
 }
 
 fn key(key: Key) -> Event {
-    Event::Key {
-        key,
-        physical_key: None,
-        pressed: true,
-        repeat: false,
-        modifiers: Modifiers::NONE,
-    }
+    Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE }
 }
 
 fn render_state() -> RenderState {
-    let setup = WgpuSetup::CreateNew(eframe::egui_wgpu::WgpuSetupCreateNew::without_display_handle());
+    let setup =
+        WgpuSetup::CreateNew(eframe::egui_wgpu::WgpuSetupCreateNew::without_display_handle());
     let configuration =
         WgpuConfiguration { wgpu_setup: setup.clone(), ..WgpuConfiguration::default() };
     pollster::block_on(async {

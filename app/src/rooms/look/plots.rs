@@ -1,7 +1,7 @@
 //! Histogram of slopes and the profile along a line.
 
-use super::{Look, Tool};
 use super::slopes::Distribution;
+use super::{Look, Tool};
 use crate::texts::look as texts;
 use crate::theme::meaning;
 use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
