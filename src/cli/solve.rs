@@ -6,9 +6,7 @@ use crate::files::FileError;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{
-    self, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown,
-};
+use crate::solve::{self, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -34,7 +32,7 @@ pub(super) struct Args {
     /// window's own, for the same maps
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// How each photosite's normal is found [default: auto]
+    /// How each photosite's normal is found [default: auto; least-squares for a preview]
     #[arg(long)]
     method: Option<MethodName>,
     /// Take the lens's distortion out of the maps
@@ -147,8 +145,10 @@ impl Args {
     /// Those of the file, with what the command line says over them.
     fn settings(&self) -> Result<Settings, FileError> {
         let kept = self.settings.as_deref().map(Settings::read).transpose()?.unwrap_or_default();
+        let usual =
+            if self.preview.is_some() { solve::MethodName::LeastSquares } else { kept.method };
         Ok(Settings {
-            method: self.method.map_or(kept.method, Into::into),
+            method: self.method.map_or(usual, Into::into),
             undistort: self.undistort || kept.undistort,
             normal_y: self.normal_y.map_or(kept.normal_y, Into::into),
             device: self.device.map_or(kept.device, Into::into),

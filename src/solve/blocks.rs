@@ -2,6 +2,7 @@
 
 use super::maps::{Albedo, Maps, is_solved};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use weavelight_calibration::description::Image;
 
 /// Albedos below this count as this: octaves of nothing would be endless.
@@ -43,7 +44,8 @@ impl Block {
 /// Blocks of `side` pixels; the last of a row or column may be smaller.
 pub(crate) fn block_grid(maps: &Maps, side: usize) -> Image<Block> {
     let (width, height) = (maps.outcome.width.div_ceil(side), maps.outcome.height.div_ceil(side));
-    let data = (0..width * height).map(|at| block(maps, side, at % width, at / width)).collect();
+    let blocks = (0..width * height).into_par_iter();
+    let data = blocks.map(|at| block(maps, side, at % width, at / width)).collect();
     Image { width, height, data }
 }
 
@@ -60,8 +62,8 @@ fn block(maps: &Maps, side: usize, column: usize, row: usize) -> Block {
     let normal = |at: usize| Vector3::from(maps.normal.data[at]).cast::<f64>();
     let mean = places.iter().map(|&at| normal(at)).sum::<Vector3<f64>>().normalize();
     let count = places.len() as f64;
-    let scatter = |at: usize| normal(at).cross(&mean).norm().asin().to_degrees().powi(2);
-    let noise = |at: usize| f64::from(maps.expected_error_deg.data[at]).powi(2);
+    let scatter = |at: usize| normal(at).cross(&mean).norm_squared();
+    let noise = |at: usize| f64::from(maps.expected_error_deg.data[at]).to_radians().powi(2);
     let sum = |of: &dyn Fn(usize) -> f64| places.iter().map(|&at| of(at)).sum::<f64>() / count;
     // The mean takes its share of the noise with it.
     let left = 1.0 - 1.0 / count;
@@ -69,7 +71,11 @@ fn block(maps: &Maps, side: usize, column: usize, row: usize) -> Block {
     Block {
         normal: mean.into(),
         octaves: albedo.map(|albedo| albedo.max(LEAST_ALBEDO).log2()),
-        roughness_deg: (sum(&scatter) - left * sum(&noise)).max(0.0).sqrt(),
+        roughness_deg: (sum(&scatter) - left * sum(&noise))
+            .clamp(0.0, 1.0)
+            .sqrt()
+            .asin()
+            .to_degrees(),
     }
 }
 

@@ -26,8 +26,9 @@ pub struct Level {
 }
 
 /// Solves a scene at [`Scale::GROWING`] resolution on the current thread pool and hands over each level as soon as it is
-/// there, until `show` breaks off. The last level is the full solution; those before it are the solutions of
-/// [`Scene::reduced`]. `progress` is of the level at work.
+/// there, until `show` breaks off. The last level is the full solution; those before it are the plain least-squares solutions
+/// of [`Scene::reduced`], as means over a curved surface are calmer than the light model is true for them, and every test of
+/// the residual fails. `progress` is of the level at work.
 ///
 /// # Errors
 /// As [`solve_scene`].
@@ -40,7 +41,7 @@ pub fn progressively(
     for scale in Scale::GROWING {
         let level = match scale {
             Scale::Full => level(scene, scale, method, progress)?,
-            _ => level(&scene.reduced(scale), scale, method, progress)?,
+            _ => level(&scene.reduced(scale), scale, Method::LeastSquares, progress)?,
         };
         if show(level).is_break() {
             break;

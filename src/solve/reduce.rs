@@ -117,20 +117,26 @@ impl<'a> Blocks<'a> {
     /// Means over one row of blocks, channels interleaved, raw numbers above black; infinite where one of the photosites
     /// clips, not a number where none counts.
     fn mean_row(&self, reading: &Reading, range: f32, row: usize, out: &mut [f32]) {
+        let (width, planes) = (self.scene.width, self.scene.layout.channels());
         let mut counts = vec![0.0_f32; out.len()];
-        let mut light = vec![0.0_f32; self.scene.width];
+        let mut light = vec![0.0_f32; width];
+        // Rows under the same filters are added up before their photosites are sorted into blocks.
+        let mut sums = [vec![0.0_f32; width * planes], vec![0.0_f32; width * planes]];
         for y in span(row, self.side, self.scene.height) {
             let of_row = &self.rows[y & 1];
             counts.iter_mut().zip(&of_row.counts).for_each(|(sum, count)| *sum += count);
             let excluded = self.excluded(y);
-            for plane in 0..self.scene.layout.channels() {
-                reading.row(y, plane, 0..self.scene.width, [range; 4], &mut light);
-                for &column in &excluded {
-                    light[column] = 0.0;
-                }
-                of_row.places.iter().for_each(|&[x, at]| out[at + plane] += light[x]);
+            for (plane, sum) in sums[y & 1].chunks_mut(width).enumerate() {
+                reading.row(y, plane, 0..width, [range; 4], &mut light);
+                excluded.iter().for_each(|&column| light[column] = 0.0);
+                sum.iter_mut().zip(&light).for_each(|(sum, light)| *sum += light);
             }
             self.forget(&excluded, of_row, &mut counts);
+        }
+        for (of_row, sums) in self.rows.iter().zip(&sums) {
+            for (plane, sum) in sums.chunks(width).enumerate() {
+                of_row.places.iter().for_each(|&[x, at]| out[at + plane] += sum[x]);
+            }
         }
         out.iter_mut().zip(&counts).for_each(|(mean, count)| *mean /= count);
         let channels = self.layout().channels();

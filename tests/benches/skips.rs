@@ -100,7 +100,8 @@ fn full_resolution(scene: &Scene) {
     let full = solving(scene);
     for (name, scale) in [("1/8", Scale::Eighth), ("1/4", Scale::Quarter), ("1/2", Scale::Half)] {
         let time = median(&mut || {
-            drop(black_box(solve_scene(&scene.reduced(scale), Method::Auto, &|_| {}).unwrap()));
+            let small = scene.reduced(scale);
+            drop(black_box(solve_scene(&small, Method::LeastSquares, &|_| {}).unwrap()));
         });
         line(&format!("full resolution: {name} of it, from frames in memory"), full, time);
     }
@@ -137,7 +138,7 @@ fn files(scene: &Scene) {
         run(&only(Outputs { normal: true, ..Outputs::NONE }), false),
     );
     for (name, scale) in [("1/8", Scale::Eighth), ("1/4", Scale::Quarter), ("1/2", Scale::Half)] {
-        let preview = Options { scale, ..options.clone() };
+        let preview = Options { scale, method: Method::LeastSquares, ..options.clone() };
         line(
             &format!("full resolution: {name} of it, from folder to folder"),
             all,
