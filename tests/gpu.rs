@@ -25,7 +25,7 @@ fn the_graphics_processor_says_the_same() {
     assert_eq!((&cpu["kind"], &cpu["adapter"]), (&Value::from("cpu"), &Value::Null));
     assert_eq!(gpu["kind"], "gpu");
     assert!(!gpu["adapter"].as_str().unwrap().is_empty());
-    assert!(gpu["sent_mb"].as_f64().unwrap() > 0.0 && gpu["waited_s"].as_f64().unwrap() > 0.0);
+    assert!(gpu["sent_mb"].as_f64().unwrap() > 0.0 && gpu["busy_s"].as_f64().unwrap() > 0.0);
     let off = home.run("compare gpu/normal.exr cpu/normal.exr --json").json();
     assert!(off["max_deg"].as_f64().unwrap() <= 1e-3, "{off}");
 }

@@ -88,10 +88,10 @@ pub struct DeviceReport {
     /// Megabytes brought back.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub received_mb: Option<f64>,
-    /// Time that threads of the processor stood waiting for it, all together. The time of the whole solve is among the
-    /// report's `seconds`.
+    /// Time that threads of the processor spent sending to it and waiting for it, all together. The time of the whole solve
+    /// is among the report's `seconds`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub waited_s: Option<f64>,
+    pub busy_s: Option<f64>,
 }
 
 impl DeviceReport {
@@ -105,7 +105,7 @@ impl DeviceReport {
             software: None,
             sent_mb: None,
             received_mb: None,
-            waited_s: None,
+            busy_s: None,
         }
     }
 }

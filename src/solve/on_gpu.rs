@@ -22,7 +22,7 @@ pub(crate) struct OnGpu<'g> {
     failure: OnceLock<GpuError>,
     bytes_up: AtomicU64,
     bytes_down: AtomicU64,
-    waited_ns: AtomicU64,
+    busy_ns: AtomicU64,
 }
 
 /// A row that is read and cut.
@@ -52,7 +52,7 @@ impl<'g> OnGpu<'g> {
             failure: OnceLock::new(),
             bytes_up: AtomicU64::new(0),
             bytes_down: AtomicU64::new(0),
-            waited_ns: AtomicU64::new(0),
+            busy_ns: AtomicU64::new(0),
         }
     }
 
@@ -71,7 +71,9 @@ impl<'g> OnGpu<'g> {
         if self.failure.get().is_some() {
             return None;
         }
+        let sending = Instant::now();
         let flight = self.gpu.submit(tile).map_err(|error| self.note(error)).ok()?;
+        self.busy(sending);
         let [up, down] = flight.bytes();
         self.bytes_up.fetch_add(up, Ordering::Relaxed);
         self.bytes_down.fetch_add(down, Ordering::Relaxed);
@@ -83,9 +85,9 @@ impl<'g> OnGpu<'g> {
         let _ = self.failure.set(error);
     }
 
-    fn waited(&self, since: Instant) {
+    fn busy(&self, since: Instant) {
         let nanoseconds = u64::try_from(since.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        self.waited_ns.fetch_add(nanoseconds, Ordering::Relaxed);
+        self.busy_ns.fetch_add(nanoseconds, Ordering::Relaxed);
     }
 }
 
@@ -171,7 +173,7 @@ impl Run<'_> {
         if let Some(flight) = flight {
             let waiting = Instant::now();
             let landed = flight.land(|answer| {
-                on.waited(waiting);
+                on.busy(waiting);
                 answered = true;
                 let mut number = 0;
                 self.write_tile(tile, worker, band, counts, |solver, input, output, cut| {
@@ -230,7 +232,7 @@ pub(super) fn report_of(why: String, on: Option<&OnGpu>) -> (DeviceReport, Optio
         software: Some(*software),
         sent_mb: Some(megabytes(&on.bytes_up)),
         received_mb: Some(megabytes(&on.bytes_down)),
-        waited_s: Some(1e-9 * on.waited_ns.load(Ordering::Relaxed) as f64),
+        busy_s: Some(1e-9 * on.busy_ns.load(Ordering::Relaxed) as f64),
     };
     let failure = on.failure().map(|error| format!("{error}; the processor solved the rest."));
     (report, failure)
