@@ -1,6 +1,8 @@
 //! The program in a real window, on a display of its own: started, a swatch scanned with the simulated board and camera, lit
 //! anew, exported, quit. With `WEAVELIGHT_PICTURES=DIR` its pictures are kept there: the README's.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot set its table up has failed")]
+
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};

@@ -11,21 +11,21 @@ use weavelight_app::rooms::Room;
 use weavelight_app::{App, settings::Settings};
 
 /// The window.
-pub type Window = Harness<'static, App>;
+pub(crate) type Window = Harness<'static, App>;
 
 /// Name of scan and solution.
-pub const SOLUTION: &str = "linen 4021";
+pub(crate) const SOLUTION: &str = "linen 4021";
 /// Small enough for a test to take a second.
 const SIZE_PX: [usize; 2] = [144, 96];
 
 /// A rig's folder; removed at the end.
-pub struct Bench {
+pub(crate) struct Bench {
     folder: tempfile::TempDir,
 }
 
 impl Bench {
     /// Simulates, and solves.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let bench = Self { folder: tempfile::tempdir().unwrap() };
         let options = simulate::Options {
             out: bench.rig(),
@@ -41,7 +41,7 @@ impl Bench {
     }
 
     /// A further solution of the same scan.
-    pub fn solve_again(&self, name: &str, method: Method) -> PathBuf {
+    pub(crate) fn solve_again(&self, name: &str, method: Method) -> PathBuf {
         let folder = self.rig().join("solutions").join(name);
         std::fs::create_dir_all(folder.parent().unwrap()).unwrap();
         let mut options = solve::Options::new(self.scan(), self.rig().join("calibration"), &folder);
@@ -51,17 +51,17 @@ impl Bench {
     }
 
     /// The capture session.
-    pub fn scan(&self) -> PathBuf {
+    pub(crate) fn scan(&self) -> PathBuf {
         self.rig().join("scans").join(SOLUTION)
     }
 
     /// Its solution.
-    pub fn solution(&self) -> PathBuf {
+    pub(crate) fn solution(&self) -> PathBuf {
         self.rig().join("solutions").join(SOLUTION)
     }
 
     /// The Look room with nothing in it.
-    pub fn empty(&self, size: [f32; 2], theme: egui::Theme) -> Window {
+    pub(crate) fn empty(&self, size: [f32; 2], theme: egui::Theme) -> Window {
         let mut settings = Settings::load_from(&self.folder.path().join("settings.toml"));
         settings.home = self.folder.path().to_owned();
         settings.rig = Some(self.rig());
@@ -80,7 +80,7 @@ impl Bench {
     }
 
     /// The Look room with the solution, opened as a user does.
-    pub fn look(&self, size: [f32; 2], theme: egui::Theme) -> Window {
+    pub(crate) fn look(&self, size: [f32; 2], theme: egui::Theme) -> Window {
         let mut window = self.empty(size, theme);
         enter_folder(&mut window, &self.solution());
         window.get_by_label("Open").click();
@@ -95,7 +95,7 @@ impl Bench {
 }
 
 /// Types a folder's path into the field for it.
-pub fn enter_folder(window: &mut Window, folder: &Path) {
+pub(crate) fn enter_folder(window: &mut Window, folder: &Path) {
     let field =
         window.get_by_role_and_label(egui::accesskit::Role::TextInput, "Folder of the solution");
     field.focus();
@@ -104,7 +104,7 @@ pub fn enter_folder(window: &mut Window, folder: &Path) {
 }
 
 /// Drags with the first button, in a few steps.
-pub fn drag(window: &mut Window, [from, to]: [egui::Pos2; 2]) {
+pub(crate) fn drag(window: &mut Window, [from, to]: [egui::Pos2; 2]) {
     window.drag_at(from);
     window.run();
     for share in [0.25, 0.5, 0.75, 1.0] {
@@ -116,7 +116,7 @@ pub fn drag(window: &mut Window, [from, to]: [egui::Pos2; 2]) {
 }
 
 /// Steps until something is there.
-pub fn wait(window: &mut Window, what: &str, mut there: impl FnMut(&Window) -> bool) {
+pub(crate) fn wait(window: &mut Window, what: &str, mut there: impl FnMut(&Window) -> bool) {
     let patience = Instant::now() + Duration::from_secs(20);
     while !there(window) {
         assert!(Instant::now() < patience, "{what} did not come: {:?}", window.state().desk());

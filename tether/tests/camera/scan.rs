@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use weavelight::compare::{self, Figures, Kind};
 use weavelight::device::board::{Board, PortChoice};
 use weavelight::device::camera::{Camera, Settings, SimulatedCamera, TetheredCamera};
-use weavelight::device::scan::{About, Begin, Control, Event, Options, Summary, scan};
+use weavelight::device::scan::{About, Begin, Control, Event, Options, Subject, Summary, scan};
 use weavelight::files::sha256_of_file;
 use weavelight::instrument::Rig;
 use weavelight::session::Session;
@@ -128,6 +128,7 @@ impl Laboratory {
     fn scan(&self, camera: &FakeCamera, exposure_s: f64, tell: &dyn Fn(&Event)) -> Summary {
         let options = Options {
             folder: self.path("session"),
+            subject: Subject::Swatch,
             about: About { name: None, thickness_mm: None },
             begin: Begin::Anew,
             exposure_s: Some(exposure_s),

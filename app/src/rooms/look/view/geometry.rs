@@ -5,7 +5,7 @@ use weavelight_calibration::description::{Camera, Plane};
 use weavelight_calibration::projection::Projector;
 
 /// Nodes along each side of the grid that the shader interpolates.
-pub const NODES: usize = 17;
+pub(super) const NODES: usize = 17;
 /// Width of what is looked at where no camera says how large it is, millimetres.
 const NOMINAL_WIDTH_MM: f64 = 100.0;
 /// Height of the eye there.
