@@ -48,7 +48,7 @@ impl Geometry {
         self.camera.is_some()
     }
 
-    /// Points of the plane at [`NODES`] x [`NODES`] places from corner to corner, rig frame, millimetres.
+    /// Points of the plane at `NODES` x `NODES` places from corner to corner, rig frame, millimetres.
     pub fn grid(&self) -> &[[f32; 4]] {
         &self.grid
     }
