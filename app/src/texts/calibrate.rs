@@ -235,8 +235,8 @@ pub fn camera_figures(boards: usize, rms_px: f64, height_mm: f64) -> String {
 
 /// What came of levels and colour.
 pub fn color_figures(nonlinearity: Option<f64>, de2000: Option<f64>) -> String {
-    let linear = nonlinearity.map_or("Linearity not measured".to_owned(), |bend| {
-        format!("Linear within {:.2} %", 100.0 * bend)
+    let linear = nonlinearity.map_or("linearity not measured".to_owned(), |bend| {
+        format!("linear within {:.2} %", 100.0 * bend)
     });
     let color = de2000
         .map_or("no colour patches".to_owned(), |de| format!("colours within CIEDE2000 {de:.2}"));

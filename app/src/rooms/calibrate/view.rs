@@ -172,9 +172,7 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
     for advice in &state.status.exposure {
         line(Sign::Warning, advice);
     }
-    if state.status.steps.iter().any(|step| step.state != StepState::Good) {
-        ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
-    }
+    ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
     ui.add_space(theme::GAP);
 }
 
