@@ -158,14 +158,15 @@ impl Window {
             ..RawInput::default()
         };
         let (look, desk) = (&mut self.look, &mut self.desk);
-        let output = self.ctx.run_ui(input, |ui| look.ui(ui, desk));
+        let mut output = self.ctx.run_ui(input, |ui| look.ui(ui, desk));
         let shapes = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let screen = ScreenDescriptor { size_in_pixels: WINDOW, pixels_per_point: 1.0 };
         let (device, queue) = (&self.state.device, &self.state.queue);
         let mut renderer = self.state.renderer.write();
-        for (id, deltas) in &output.textures_delta.set {
-            deltas.iter().for_each(|delta| renderer.update_texture(device, queue, *id, delta));
+        for (id, deltas) in output.textures_delta.set.drain() {
+            deltas.iter().for_each(|delta| renderer.update_texture(device, queue, id, delta));
         }
+        output.textures_delta.free.drain().for_each(|id| renderer.free_texture(&id));
         let mut encoder = device.create_command_encoder(&Default::default());
         let mut buffers = renderer.update_buffers(device, queue, &mut encoder, &shapes, &screen);
         let attachment = wgpu::RenderPassColorAttachment {

@@ -48,10 +48,8 @@ fn a_light_beside_its_frame_with_a_photosite() {
         window.get_by_label("Rig's lights").click();
         window.run();
         window.get_by_label("Beside its captured frame").click();
-        bench::wait(window, "the frame", |window| {
-            let waiting = window.query_by_label("Reading the frames…").is_some();
-            !waiting && !window.state().desk().is_busy()
-        });
+        window.run();
+        bench::wait(window, "the frame", |window| window.state().is_idle());
         window.run();
         let cloth = pos2(360.0, 330.0);
         window.drag_at(cloth);

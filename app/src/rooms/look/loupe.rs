@@ -13,7 +13,7 @@ use weavelight::solve::{Part, Photosite};
 /// Photosites along the loupe's side: odd, so that one is in the middle.
 const SIDE: isize = 11;
 /// Side of one, points.
-const CELL: f32 = 8.0;
+const CELL: f32 = 7.0;
 
 impl Look {
     pub(super) fn loupe(&self, ui: &mut Ui) {
@@ -95,6 +95,7 @@ fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>
         ui.end_row();
     };
     Grid::new("photosite").num_columns(2).spacing([6.0, 2.0]).min_row_height(15.0).show(ui, |ui| {
+        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
         row(ui, texts::PIXEL, format!("{x}, {y}"));
         if maps.geometry.is_physical() {
             let point = maps.geometry.on_plane([x as f64, y as f64]);
@@ -115,6 +116,7 @@ fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>
 
 fn table(ui: &mut Ui, photosite: &Photosite) {
     Grid::new("lights").num_columns(4).spacing([8.0, 2.0]).min_row_height(16.0).show(ui, |ui| {
+        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
         for title in texts::LIGHT_COLUMNS {
             ui.label(RichText::new(title).weak().small());
         }

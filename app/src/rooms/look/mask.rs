@@ -91,7 +91,7 @@ impl Painting {
             let to = of_axis().fold(f64::NEG_INFINITY, f64::max) + margin;
             let first = from.floor().max(0.0) as usize;
             let end = ((to.ceil() + 1.0).max(0.0) as usize).min(length);
-            (first < end).then_some((first, end - first))
+            (first < end).then(|| (first, end - first))
         };
         let ((left, width), (top, height)) =
             (range(0, self.mask.width)?, range(1, self.mask.height)?);

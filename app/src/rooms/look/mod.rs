@@ -185,6 +185,7 @@ impl Look {
             Told::Other { name, surface, angles } => {
                 self.other = Some(Other { name, surface, angles });
                 self.layers.compare();
+                self.path.clear();
             }
             Told::Picture { light, picture } => {
                 self.awaited = None;
@@ -217,8 +218,7 @@ impl Look {
         let again = self.opened.as_ref().is_some_and(|old| old.folder == opened.folder);
         let kept = again.then(|| std::mem::take(&mut self.view));
         let lamp = again.then(|| self.lamp.clone());
-        let path = std::mem::take(&mut self.path);
-        *self = Self { path, ..Self::default() };
+        *self = Self::default();
         self.view = kept.unwrap_or_default();
         self.lamp = lamp.unwrap_or_else(|| {
             let mut lamp = Lamp::default();

@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(found.counts.iter().sum::<u64>(), 390);
         assert_eq!([0, 10, 20, 30].map(|k| found.counts[k] > 90), [true; 4]);
         // Half precision.
-        assert!((found.median_deg - 10.5).abs() < 0.1 && (found.p95_deg - 30.5).abs() < 0.1);
+        assert!((found.median_deg - 20.5).abs() < 0.1 && (found.p95_deg - 30.5).abs() < 0.1);
         assert!((found.mean_deg - 15.5).abs() < 0.3, "{}", found.mean_deg);
     }
 

@@ -99,7 +99,9 @@ impl MapView {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, canvas.name));
         let size = canvas.maps.size();
         if self.size != size {
-            (self.size, self.viewport) = (size, None);
+            // Where a place was chosen before the first maps came, it stays.
+            self.viewport = self.viewport.filter(|_| self.size == [0, 0]);
+            self.size = size;
         }
         let mut viewport = self.viewport.unwrap_or_else(|| Viewport::fit(size, rect));
         let moved = navigate(&mut viewport, ui, &response, (size, rect), canvas.drag_pans);

@@ -132,7 +132,7 @@ mod tests {
             assert_eq!(tiles.len(), count, "zoom {zoom}");
         };
         check(1.0, 0, 4 * 4);
-        check(64.0, 0, 2);
+        check(64.0, 0, 1);
         check(0.4, 1, 4 * 2);
         check(0.01, 3, 1);
     }
