@@ -241,10 +241,11 @@ impl Look {
             }
         });
         ui.add_space(2.0 * theme::WIDE_GAP);
-        let width = ui.available_width().min(620.0);
-        ui.horizontal(|ui| {
-            ui.add_space((ui.available_width() - width) / 2.0);
-            ui.set_max_width(width);
+        let (_, row) = ui.allocate_space(egui::vec2(ui.available_width(), 32.0));
+        let size = egui::vec2(row.width().min(620.0), row.height());
+        let field =
+            egui::UiBuilder::new().max_rect(egui::Rect::from_center_size(row.center(), size));
+        ui.scope_builder(field, |ui| {
             self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
                 desk.ask(Command::Look(Ask::Open(folder)));
             });
