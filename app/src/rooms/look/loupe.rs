@@ -6,7 +6,7 @@ use crate::texts::look as texts;
 use crate::theme::{self, meaning};
 use crate::widgets::Sign;
 use eframe::egui::{
-    self, Color32, Grid, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
+    self, Color32, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
 };
 use weavelight::solve::{Part, Photosite};
 
@@ -89,54 +89,60 @@ fn magnify(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2]) {
 }
 
 fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>) {
-    let row = |ui: &mut Ui, name: &str, value: String| {
-        ui.label(RichText::new(name).weak().small());
-        ui.label(RichText::new(value).monospace().size(12.0));
-        ui.end_row();
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let row =
+        |ui: &mut Ui, name: &str, value: String| cells(ui, &[(name, 40.0), (value.as_str(), 0.0)]);
+    row(ui, texts::PIXEL, format!("{x}, {y}"));
+    if maps.geometry.is_physical() {
+        let point = maps.geometry.on_plane([x as f64, y as f64]);
+        row(ui, texts::PLACE, format!("{:.2}, {:.2} mm", point.x, point.y));
+    }
+    let Some(sample) = sample else {
+        return row(ui, texts::NORMAL, texts::UNSOLVED.to_owned());
     };
-    Grid::new("photosite").num_columns(2).spacing([6.0, 2.0]).min_row_height(15.0).show(ui, |ui| {
-        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
-        row(ui, texts::PIXEL, format!("{x}, {y}"));
-        if maps.geometry.is_physical() {
-            let point = maps.geometry.on_plane([x as f64, y as f64]);
-            row(ui, texts::PLACE, format!("{:.2}, {:.2} mm", point.x, point.y));
+    let [nx, ny, nz] = sample.normal;
+    row(ui, texts::NORMAL, format!("{nx:.3} {ny:.3} {nz:.3}"));
+    row(ui, texts::SLOPE, format!("{:.1}°", sample.slope_deg()));
+    let [r, g, b] = sample.albedo;
+    row(ui, texts::ALBEDO, format!("{r:.3} {g:.3} {b:.3}"));
+    row(ui, texts::ERROR, format!("{:.2}°", sample.error_deg));
+}
+
+/// Texts on one line, each in a cell of its width (points; 0 for what is left). Their own widths never move the cells, as
+/// they would in a grid.
+fn cells(ui: &mut Ui, texts: &[(&str, f32)]) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 0.0;
+        ui.spacing_mut().interact_size.y = 15.0;
+        for (text, width) in texts {
+            let label = egui::Label::new(RichText::new(*text).size(12.0)).extend();
+            let start = ui.cursor().left();
+            ui.add(label);
+            let used = ui.cursor().left() - start;
+            ui.add_space((width - used).max(0.0));
         }
-        let Some(sample) = sample else {
-            row(ui, texts::NORMAL, texts::UNSOLVED.to_owned());
-            return;
-        };
-        let [nx, ny, nz] = sample.normal;
-        row(ui, texts::NORMAL, format!("{nx:.3} {ny:.3} {nz:.3}"));
-        row(ui, texts::SLOPE, format!("{:.1}°", sample.slope_deg()));
-        let [r, g, b] = sample.albedo;
-        row(ui, texts::ALBEDO, format!("{r:.3} {g:.3} {b:.3}"));
-        row(ui, texts::ERROR, format!("{:.2}°", sample.error_deg));
     });
 }
 
 fn table(ui: &mut Ui, photosite: &Photosite) {
-    Grid::new("lights").num_columns(4).spacing([8.0, 2.0]).min_row_height(16.0).show(ui, |ui| {
-        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
-        for title in texts::LIGHT_COLUMNS {
-            ui.label(RichText::new(title).weak().small());
-        }
-        ui.end_row();
-        for sample in &photosite.samples {
-            let number = |value: Option<f32>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
-            ui.label(RichText::new(sample.light.to_string()).monospace().size(12.0));
-            ui.label(RichText::new(number(sample.measured)).monospace().size(12.0));
-            ui.label(RichText::new(number(sample.predicted)).monospace().size(12.0));
-            ui.horizontal(|ui| {
-                ui.spacing_mut().item_spacing.x = 2.0;
-                let (sign, text) = verdict(sample.part);
-                if let Some(sign) = sign {
-                    sign.ui(ui);
-                }
-                ui.label(RichText::new(text).size(12.0));
-            });
-            ui.end_row();
-        }
-    });
+    ui.spacing_mut().item_spacing.y = 1.0;
+    let [light, measured, fit, _] = texts::LIGHT_COLUMNS;
+    cells(ui, &[(light, 44.0), (measured, 66.0), (fit, 52.0)]);
+    for sample in &photosite.samples {
+        let number = |value: Option<f32>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
+        let (sign, text) = verdict(sample.part);
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            let numbers =
+                [sample.light.to_string(), number(sample.measured), number(sample.predicted)];
+            let [light, measured, fit] = numbers.each_ref().map(String::as_str);
+            cells(ui, &[(light, 44.0), (measured, 66.0), (fit, 52.0)]);
+            if let Some(sign) = sign {
+                sign.ui(ui);
+            }
+            ui.label(RichText::new(text).size(12.0));
+        });
+    }
 }
 
 fn verdict(part: Part) -> (Option<Sign>, &'static str) {
