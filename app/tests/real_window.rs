@@ -136,6 +136,14 @@ fn exists(file: &Path) {
     until(&file.display().to_string(), || file.exists().then_some(()));
 }
 
+/// Pixels that differ visibly between two pictures.
+fn changed_pixels(before: &Path, after: &Path) -> usize {
+    let read = |file: &Path| image::open(file).unwrap().to_rgb8();
+    let differ =
+        |(a, b): (&image::Rgb<u8>, &image::Rgb<u8>)| (0..3).any(|c| a.0[c].abs_diff(b.0[c]) > 8);
+    read(before).pixels().zip(read(after).pixels()).filter(|pair| differ(*pair)).count()
+}
+
 #[test]
 fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
     let Some(mut desktop) = Desktop::start() else {
@@ -179,7 +187,17 @@ fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
     exists(&desktop.home().join("exports/linen 1 maps/normal.exr"));
     desktop.key("Return");
     std::thread::sleep(Duration::from_secs(2));
-    desktop.picture("app-look");
+    let before = desktop.picture("app-look");
+    // The hand on the light: it follows, and the cloth with it.
+    desktop.xdotool(&["mousemove", "560", "420", "mousedown", "1"]);
+    for place in [["520", "380"], ["470", "330"], ["420", "280"]] {
+        desktop.xdotool(&["mousemove", place[0], place[1]]);
+        std::thread::sleep(Duration::from_millis(150));
+    }
+    desktop.xdotool(&["mouseup", "1"]);
+    let after = desktop.picture("app-relit");
+    let changed = changed_pixels(&before, &after);
+    assert!(changed > 50_000, "{changed} pixels changed under the light that was dragged");
     desktop.quit();
     let kept = std::fs::read_to_string(config.join("settings.toml")).unwrap();
     assert!(kept.contains("room = \"look\""), "the room is remembered:\n{kept}");
