@@ -91,7 +91,7 @@ fn magnify(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2]) {
 fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>) {
     ui.spacing_mut().item_spacing.y = 1.0;
     let row =
-        |ui: &mut Ui, name: &str, value: String| cells(ui, &[(name, 40.0), (value.as_str(), 0.0)]);
+        |ui: &mut Ui, name: &str, value: String| cells(ui, &[(name, 52.0), (value.as_str(), 0.0)]);
     row(ui, texts::PIXEL, format!("{x}, {y}"));
     if maps.geometry.is_physical() {
         let point = maps.geometry.on_plane([x as f64, y as f64]);
