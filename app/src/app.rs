@@ -1,6 +1,7 @@
 //! The window as a whole: the rooms' rail, the room that is open, what is going on, what went wrong, and the keys.
 
-use crate::desk::{Activity, Brake, Desk};
+use crate::desk::{Activity, Brake, Desk, Problem};
+use crate::keeper::Keeper;
 use crate::rooms::{
     Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan::Scan, scans::Scans,
     welcome::Welcome,
@@ -16,6 +17,7 @@ use eframe::egui_wgpu::RenderState;
 pub struct App {
     desk: Desk,
     worker: Worker,
+    keeper: Keeper,
     welcome: Welcome,
     rig: Rig,
     calibrate: Calibrate,
@@ -30,14 +32,21 @@ impl App {
     /// A window as it was when it was closed. `renderer`: where the Look room puts its textures; the window works without.
     pub fn new(ctx: &egui::Context, renderer: Option<&RenderState>, settings: Settings) -> Self {
         theme::apply(ctx, &settings);
-        let worker = Worker::start(ctx.clone());
-        if let Some(rig) = settings.rig.clone().filter(|rig| rig.exists()) {
-            worker.ask(Command::Open(rig));
-        }
         look::view::install(ctx, renderer);
+        let worker = Worker::start(ctx.clone());
+        let mut desk = Desk::new(settings.clone());
+        if let Some(aside) = settings.put_aside() {
+            desk.tell(Problem::warning(texts::SETTINGS, texts::settings_put_aside(aside)));
+        }
+        match settings.rig.as_ref() {
+            Some(rig) if rig.exists() => worker.ask(Command::Open(rig.clone())),
+            Some(rig) => desk.tell(Problem::warning(texts::rig::OPENING, texts::rig::gone(rig))),
+            None => {}
+        }
         Self {
-            desk: Desk::new(settings),
+            desk,
             worker,
+            keeper: Keeper::start(settings),
             welcome: Welcome::default(),
             rig: Rig::default(),
             calibrate: Calibrate::default(),
@@ -106,6 +115,13 @@ impl App {
         }
         for command in self.desk.take_asked() {
             self.worker.ask(command);
+        }
+    }
+
+    fn keep_settings(&mut self) {
+        self.keeper.look_at(&self.desk.settings);
+        if let Some(text) = self.keeper.trouble() {
+            self.desk.tell(Problem::error(texts::KEEPING_SETTINGS, text));
         }
     }
 
@@ -208,7 +224,7 @@ impl App {
                 }
             });
         });
-        egui::ScrollArea::vertical().max_height(180.0).show(ui, |ui| {
+        egui::ScrollArea::vertical().show(ui, |ui| {
             ui.set_width(ui.available_width());
             // The newest first.
             let problems = std::mem::take(&mut self.desk.problems);
@@ -252,12 +268,16 @@ impl eframe::App for App {
         self.keys(ctx);
         self.rooms_change();
         self.hand_over();
+        self.keep_settings();
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         egui::Panel::bottom("status").exact_size(40.0).show(ui, |ui| self.status(ui));
         if !self.desk.problems.is_empty() {
-            egui::Panel::bottom("problems").show(ui, |ui| self.problems(ui));
+            // As many as are there, up to three; more by scrolling.
+            let height = 44.0 + 66.0 * self.desk.problems.len().min(3) as f32;
+            let panel = egui::Panel::bottom("problems").exact_size(height);
+            panel.show(ui, |ui| self.problems(ui));
         }
         egui::Panel::left("rail").exact_size(116.0).resizable(false).show(ui, |ui| self.rail(ui));
         egui::CentralPanel::default().show(ui, |ui| self.room(ui));
@@ -268,7 +288,6 @@ impl eframe::App for App {
 
     fn on_exit(&mut self) {
         self.worker.brake.cancel();
-        // There is nobody left to be told.
-        let _ = self.desk.settings.save();
+        self.keep_settings();
     }
 }

@@ -43,6 +43,18 @@ pub struct Problem {
     pub severity: Severity,
 }
 
+impl Problem {
+    /// Work that failed.
+    pub fn error(title: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { title: title.into(), text: text.into(), severity: Severity::Error }
+    }
+
+    /// Something that ought to be known.
+    pub fn warning(title: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { title: title.into(), text: text.into(), severity: Severity::Warning }
+    }
+}
+
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {

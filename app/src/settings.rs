@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-pub use weavelight::solve::{MethodName, NormalYName, Settings as SolveSettings};
+pub use weavelight::solve::{DeviceName, MethodName, NormalYName, Settings as SolveSettings};
 
 /// What is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,8 @@ pub struct Settings {
     pub window_size: [f32; 2],
     /// Which room was open.
     pub room: crate::rooms::Room,
+    /// What was written for the last scan.
+    pub scan: crate::rooms::scan::FormSettings,
     /// How scans are solved.
     pub solve: SolveSettings,
     /// The calibration targets in use.
@@ -30,6 +32,9 @@ pub struct Settings {
     /// Where these settings are kept; not part of the file.
     #[serde(skip)]
     file: Option<PathBuf>,
+    /// Nor is this.
+    #[serde(skip)]
+    put_aside: Option<PathBuf>,
 }
 
 /// Light or dark.
@@ -55,25 +60,39 @@ impl Default for Settings {
             scale: 1.0,
             window_size: [1280.0, 800.0],
             room: crate::rooms::Room::Scan,
+            scan: Default::default(),
             solve: SolveSettings::default(),
             targets: Default::default(),
             file: None,
+            put_aside: None,
         }
     }
 }
 
 impl Settings {
-    /// Those of this user; the defaults where there are none, or they cannot be read: a window that does not open over its
-    /// settings would be worse.
+    /// Those of this user; see [`Settings::load_from`].
     pub fn load() -> Self {
         Self::load_from(&configuration_folder().join("settings.toml"))
     }
 
-    /// Those in a file; they will be kept there.
+    /// Those in a file; they will be kept there. The defaults where there is none, or it cannot be read: a window that does not
+    /// open over its settings would be worse. What cannot be read is put aside, and [`Settings::put_aside`] says where.
     pub fn load_from(file: &Path) -> Self {
-        let text = std::fs::read_to_string(file).unwrap_or_default();
-        let settings: Self = toml::from_str(&text).unwrap_or_default();
-        Self { file: Some(file.to_owned()), ..settings }
+        let text = std::fs::read_to_string(file);
+        let known = text.map(|text| toml::from_str::<Self>(&text));
+        let mut settings = Self::default();
+        match known {
+            Ok(Ok(read)) => settings = read,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            _ => settings.put_aside = put_aside(file),
+        }
+        settings.file = Some(file.to_owned());
+        settings
+    }
+
+    /// Where the settings are that could not be read.
+    pub fn put_aside(&self) -> Option<&Path> {
+        self.put_aside.as_deref()
     }
 
     /// Writes them where they came from, whole or not at all.
@@ -88,6 +107,12 @@ impl Settings {
         }
         weavelight::files::write_atomic(file, text.as_bytes())
     }
+}
+
+/// Renames a file that cannot be read; `None` where even that is impossible.
+fn put_aside(file: &Path) -> Option<PathBuf> {
+    let aside = file.with_extension("unreadable.toml");
+    std::fs::rename(file, &aside).ok().map(|()| aside)
 }
 
 fn home() -> PathBuf {
@@ -116,10 +141,15 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_file_gives_the_defaults() {
+    fn a_broken_file_gives_the_defaults_and_is_kept() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("settings.toml");
         std::fs::write(&file, "scale = \"huge").unwrap();
-        assert_eq!(Settings::load_from(&file).scale, 1.0);
+        let settings = Settings::load_from(&file);
+        let aside = folder.path().join("settings.unreadable.toml");
+        assert_eq!((settings.scale, settings.put_aside()), (1.0, Some(aside.as_path())));
+        settings.save().unwrap();
+        assert_eq!(std::fs::read_to_string(aside).unwrap(), "scale = \"huge");
+        assert_eq!(Settings::load_from(&file).put_aside(), None);
     }
 }

@@ -6,6 +6,12 @@ pub mod calibrate;
 pub const TITLE: &str = "Weavelight";
 /// Where the program itself is at fault.
 pub const BUG: &str = "the program stumbled over itself; nothing was lost. Please try again, and report it if it comes back";
+/// The button that opens the system's folder dialogue.
+pub const BROWSE: &str = "Browse…";
+/// What is remembered.
+pub const SETTINGS: &str = "Settings";
+/// Where they cannot be kept.
+pub const KEEPING_SETTINGS: &str = "Keeping the settings";
 /// The button that ends work.
 pub const CANCEL: &str = "Cancel";
 /// The button that puts a problem away.
@@ -36,6 +42,12 @@ pub const KEYS: [(&str, &str); 8] = [
     ("Esc       ", "end what is going on"),
     ("Ctrl+Q    ", "leave"),
 ];
+
+/// Where the settings could not be read.
+pub fn settings_put_aside(file: &std::path::Path) -> String {
+    let file = file.display();
+    format!("the settings could not be read, so the window begins anew; they are kept in {file}")
+}
 
 /// Time left, in words.
 pub fn time_left(seconds: f64) -> String {
@@ -77,8 +89,6 @@ pub mod welcome {
     pub const OPEN_WHAT: &str = "The folder that holds rig.toml; or drag it into this window.";
     /// The path's field.
     pub const PATH: &str = "Folder of the rig";
-    /// The button beside it.
-    pub const BROWSE: &str = "Browse…";
     /// Name of the simulated rig's folder.
     pub const SIMULATED: &str = "simulated rig";
 }
@@ -125,6 +135,14 @@ pub mod rig {
     pub const COLUMNS: [&str; 4] = ["Light", "Output", "Measured with a ruler", "Calibrated"];
     /// In place of a place.
     pub const FAR: &str = "far away";
+
+    /// Where the rig was that was open last.
+    pub fn gone(rig: &std::path::Path) -> String {
+        let rig = rig.display();
+        format!(
+            "{rig} is not there any more; connect its disk and start again, or open the rig from where it is now"
+        )
+    }
 
     /// Where everything lies.
     pub fn folder(name: &str) -> String {
@@ -231,6 +249,10 @@ pub mod scan {
         ("Least squares", "Plain: every unsaturated sample, all of equal weight"),
         ("Robust everywhere", "Shadows and highlights looked for at every photosite"),
     ];
+    /// What computes, as on the command line.
+    pub const DEVICE: &str = "Computed on";
+    /// The choices.
+    pub const DEVICES: [&str; 3] = ["whichever is faster", "the processor", "the graphics card"];
     /// As on the command line.
     pub const UNDISTORT: &str = "Take out the lens's distortion";
     /// As on the command line.
@@ -238,7 +260,9 @@ pub mod scan {
     /// The big button.
     pub const SCAN: &str = "Scan the swatch";
     /// Its key.
-    pub const SPACE: &str = "Space scans";
+    pub const SPACE: &str = "or press Space";
+    /// Why it is grey.
+    pub const BUSY: &str = "Something else is going on; see below";
     /// Why it is grey.
     pub const TAKEN: &str = "A scan of this name is there already; choose another name";
     /// While it runs.
@@ -271,10 +295,15 @@ pub mod scan {
     pub const LAYING_OUT: &str = "Laying out the fabric";
     /// Work.
     pub const THROWING_AWAY: &str = "Moving the scan to the bin";
-    /// Layers of the preview.
-    pub const NORMALS: &str = "Normals";
-    /// Layers of the preview.
-    pub const ALBEDO: &str = "Albedo";
+    /// Layers of the maps.
+    pub const LAYERS: [&str; 3] = ["Relit", "Normals", "Albedo"];
+    /// The maps, for those who do not see them.
+    pub const MAPS: &str = "Maps of the swatch so far";
+    /// How to see the cloth from all sides.
+    pub const DRAG_LIGHT: &str =
+        "Drag: move the light. Wheel: zoom. Right button: move the picture.";
+    /// How to move the maps.
+    pub const DRAG_MAPS: &str = "Drag: move the picture. Wheel: zoom.";
     /// Of the test shot.
     pub const MARK_CLIPPED: &str = "Mark what clips";
     /// Of the test shot.
@@ -296,6 +325,11 @@ pub mod scan {
         "This rig is not calibrated yet: scans can be taken, but maps need a calibration";
     /// The way out.
     pub const CALIBRATE: &str = "Calibrate it";
+
+    /// A swatch's thickness; 0 where nobody measured it.
+    pub fn thickness(mm: f64) -> String {
+        if mm > 0.0 { format!("{mm:.2} mm") } else { "not measured".to_owned() }
+    }
 
     /// Work.
     pub fn scanning(name: &str) -> String {

@@ -27,7 +27,8 @@ pub fn empty(ui: &mut egui::Ui, what: &str, remedy: &str) -> bool {
     ui.vertical_centered(|ui| {
         ui.add_space(ui.available_height() * 0.3);
         ui.label(RichText::new(what).size(16.0).weak());
-        ui.button(remedy).clicked()
+        ui.add_space(crate::theme::GAP);
+        primary(ui, remedy, vec2(220.0, crate::theme::BIG), true).clicked()
     })
     .inner
 }

@@ -71,6 +71,35 @@ impl Desktop {
         ]);
     }
 
+    /// A calibrated rig that was open last, and the file that says so.
+    fn rig(&self, size_px: [usize; 2]) -> (PathBuf, PathBuf) {
+        let rig = self.home().join("rig");
+        let options = simulate::Options {
+            out: rig.clone(),
+            size_px: Some(size_px),
+            only: vec![simulate::Part::Swatch],
+            ..Default::default()
+        };
+        simulate::run(&options, &|_, _| ()).unwrap();
+        let config = self.home().join("config/weavelight");
+        std::fs::create_dir_all(&config).unwrap();
+        let file = config.join("settings.toml");
+        let settings = format!(
+            "schema = 1\nrig = {:?}\nhome = {:?}\ntheme = \"dark\"\n",
+            rig.display().to_string(),
+            self.home().display().to_string()
+        );
+        std::fs::write(&file, settings).unwrap();
+        (rig, file)
+    }
+
+    /// As by a power cut: no signal that a program could hear.
+    fn kill(&mut self) {
+        let mut app = self.app.take().unwrap();
+        app.kill().unwrap();
+        app.wait().unwrap();
+    }
+
     fn xdotool(&self, arguments: &[&str]) {
         let done = Command::new("xdotool")
             .env("DISPLAY", &self.display)
@@ -150,23 +179,8 @@ fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
         println!("not run: Xvfb, xdotool or ImageMagick is missing");
         return;
     };
-    let rig = desktop.home().join("rig");
     let pictures = std::env::var_os("WEAVELIGHT_PICTURES").is_some();
-    let options = simulate::Options {
-        out: rig.clone(),
-        size_px: Some(if pictures { PICTURE_FRAME } else { FRAME }),
-        only: vec![simulate::Part::Swatch],
-        ..Default::default()
-    };
-    simulate::run(&options, &|_, _| ()).unwrap();
-    let config = desktop.home().join("config/weavelight");
-    std::fs::create_dir_all(&config).unwrap();
-    let settings = format!(
-        "schema = 1\nrig = {:?}\nhome = {:?}\ntheme = \"dark\"\n",
-        rig.display().to_string(),
-        desktop.home().display().to_string()
-    );
-    std::fs::write(config.join("settings.toml"), settings).unwrap();
+    let (rig, settings) = desktop.rig(if pictures { PICTURE_FRAME } else { FRAME });
 
     desktop.open();
     desktop.key("ctrl+3");
@@ -199,6 +213,34 @@ fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
     let changed = changed_pixels(&before, &after);
     assert!(changed > 50_000, "{changed} pixels changed under the light that was dragged");
     desktop.quit();
-    let kept = std::fs::read_to_string(config.join("settings.toml")).unwrap();
+    let kept = std::fs::read_to_string(settings).unwrap();
     assert!(kept.contains("room = \"look\""), "the room is remembered:\n{kept}");
+}
+
+/// The program is killed while it scans; started again, it opens the rig and the room, and goes on where the scan stood.
+#[test]
+fn a_killed_window_reopens_the_scan_where_it_stood() {
+    let Some(mut desktop) = Desktop::start() else {
+        println!("not run: Xvfb, xdotool or ImageMagick is missing");
+        return;
+    };
+    let (rig, _) = desktop.rig(FRAME);
+    let scan = rig.join("scans/linen 1");
+    desktop.open();
+    desktop.key("ctrl+3");
+    desktop.key("space");
+    exists(&scan.join("light-04.dng"));
+    desktop.kill();
+    let frame = |light: usize| std::fs::metadata(scan.join(format!("light-{light:02}.dng")));
+    assert!(frame(9).is_err(), "it was killed in the middle");
+    let before = frame(3).unwrap().modified().unwrap();
+
+    desktop.open();
+    desktop.picture("app-reopened");
+    // "Continue it" has the keyboard from the start: one key goes on.
+    desktop.key("Return");
+    exists(&rig.join("solutions/linen 1/report.json"));
+    assert!(frame(9).is_ok());
+    assert_eq!(frame(3).unwrap().modified().unwrap(), before, "what was there is not taken again");
+    desktop.quit();
 }

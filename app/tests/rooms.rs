@@ -9,6 +9,7 @@ use desk::{Window, both_themes};
 use eframe::egui;
 use egui_kittest::kittest::Queryable;
 use weavelight_app::rooms::Room;
+use weavelight_app::{settings::Settings, worker::Command};
 
 #[test]
 fn a_first_start_offers_a_simulated_rig() {
@@ -116,6 +117,119 @@ fn a_fault_in_the_middle_is_told_and_the_scan_goes_on_later() {
     window.until_label("Continue it");
     window.click("Continue it");
     window.until_label("Look closer");
+}
+
+#[test]
+fn what_went_wrong_is_shown_with_its_remedy() {
+    let gone = |settings: &mut Settings| settings.rig = Some("/no/such/rig".into());
+    desk::state("problems", gone, |window| {
+        window.harness.state_mut().ask(Command::Open("/no/such/rig".into()));
+        window.until("both are told", |app| app.desk().problems.len() == 2);
+        window.idle();
+    });
+}
+
+#[test]
+fn a_frame_that_clips_is_marked_and_the_remedy_named() {
+    let long = |settings: &mut Settings| settings.scan.exposure_s = 0.55;
+    desk::state("clipped", long, |window| {
+        window.open_small_rig();
+        window.enter(Room::Scan);
+        window.click("Test shot");
+        window.click("Mark what clips");
+        window.idle();
+    });
+}
+
+#[test]
+fn a_scan_that_was_killed_is_the_first_thing_to_be_seen() {
+    desk::state(
+        "unfinished",
+        |_| {},
+        |window| {
+            window.open_small_rig();
+            window.killed_scan("linen 1", 4);
+            window.open_small_rig();
+            window.enter(Room::Scan);
+            window.until_label("Continue it");
+            window.idle();
+        },
+    );
+}
+
+#[test]
+fn a_rig_without_calibration_leads_to_it() {
+    desk::state(
+        "not-calibrated",
+        |_| {},
+        |window| {
+            window.open_small_rig();
+            std::fs::remove_dir_all(window.rig().join("calibration")).unwrap();
+            window.open_small_rig();
+            window.enter(Room::Scan);
+            window.until_label("Calibrate it");
+            window.idle();
+        },
+    );
+}
+
+#[test]
+fn without_scans_the_room_leads_to_the_first() {
+    desk::state(
+        "no-scans",
+        |_| {},
+        |window| {
+            window.open_small_rig();
+            window.enter(Room::Scans);
+            window.idle();
+        },
+    );
+}
+
+/// The next day: the form is as it was, and the name counted on past the scans that are there.
+#[test]
+fn a_window_begins_where_the_last_one_ended() {
+    let kept = |settings: &mut Settings| {
+        settings.scan.name = "silk 12".into();
+        settings.scan.thickness_mm = 0.4;
+    };
+    let mut window = Window::with(desk::WIDE, egui::Theme::Dark, kept);
+    window.open_small_rig();
+    window.scan_in_the_library("silk 12");
+    window.scan_in_the_library("silk 13");
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    let form = &window.harness.state().desk().settings.scan;
+    assert_eq!((form.name.as_str(), form.thickness_mm), ("silk 14", 0.4));
+    // It is on the disk long before the window closes.
+    let file = window.home().join("settings.toml");
+    window.until("the settings are kept", |_| {
+        std::fs::read_to_string(&file).is_ok_and(|text| text.contains("silk 14"))
+    });
+}
+
+/// The light in the hand, while nobody has looked any closer yet.
+#[test]
+fn the_maps_of_a_scan_are_lit_by_hand() {
+    let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
+    window.open_small_rig();
+    window.enter(Room::Scan);
+    window.click("Scan the swatch");
+    window.until_label("Look closer");
+    window.idle();
+    let before = window.harness.render().unwrap();
+    let maps = window.harness.get_by_label("Maps of the swatch so far").rect();
+    let [from, to] = [(0.3, 0.3), (0.8, 0.7)].map(|(x, y)| maps.lerp_inside(egui::vec2(x, y)));
+    window.harness.drag_at(from);
+    window.harness.step();
+    window.harness.hover_at(to);
+    window.harness.step();
+    window.harness.drop_at(to);
+    window.idle();
+    let after = window.harness.render().unwrap();
+    let changed = before.pixels().zip(after.pixels()).filter(|(a, b)| a != b).count();
+    let all = maps.area() as usize;
+    assert!(changed > all / 4, "{changed} of {all} pixels are lit otherwise");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Where there is no rig yet: one way to try it, one way to open one's own.
 
+use crate::browse::Browse;
 use crate::desk::Desk;
 use crate::texts::welcome as texts;
 use crate::worker::Command;
@@ -14,13 +15,20 @@ const WIDTH: f32 = 560.0;
 #[derive(Debug, Default)]
 pub struct Welcome {
     path: String,
+    browse: Browse,
 }
 
 impl Welcome {
     /// Draws it in the middle of what there is.
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let above = (ui.available_height() * 0.18).max(theme::WIDE_GAP);
+        // Where the window is small and something went wrong, there is not room for all.
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.cards(ui, above, desk));
+    }
+
+    fn cards(&mut self, ui: &mut egui::Ui, above: f32, desk: &mut Desk) {
         ui.vertical_centered(|ui| {
-            ui.add_space((ui.available_height() * 0.18).max(theme::WIDE_GAP));
+            ui.add_space(above);
             ui.label(RichText::new(texts::HEADING).size(28.0).strong());
             ui.label(RichText::new(texts::WHAT).size(16.0));
             ui.add_space(2.0 * theme::WIDE_GAP);
@@ -46,9 +54,7 @@ impl Welcome {
             let field = egui::TextEdit::singleline(&mut self.path).desired_width(width.max(80.0));
             let entered = ui.add(field).labelled_by(label.id).lost_focus()
                 && ui.input(|input| input.key_pressed(egui::Key::Enter));
-            if ui.button(texts::BROWSE).clicked()
-                && let Some(folder) = rfd::FileDialog::new().pick_folder()
-            {
+            if let Some(folder) = self.browse.folder(ui) {
                 self.path = folder.display().to_string();
             }
             let named = !self.path.trim().is_empty();

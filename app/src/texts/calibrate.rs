@@ -50,8 +50,6 @@ pub const CHART_HINT: &str = "A TOML file with schema = 1 and [[target.patches]]
 /// Where it is missing.
 pub const NO_CHART: &str =
     "the chart is not described; name its file, with [[target.patches]] as in a session.toml";
-/// Looks for a file.
-pub const BROWSE: &str = "Browse…";
 /// The sheet's reflectance.
 pub const REFLECTANCE: &str = "Reflectance";
 /// The raised sheet's height.

@@ -10,7 +10,6 @@ pub const TO_SCANS: &str = "Go to the scans";
 pub const FOLDER: &str = "Folder of the solution";
 pub const OPEN: &str = "Open";
 pub const COMPARE: &str = "Compare";
-pub const BROWSE: &str = "Browse…";
 pub const OPEN_MENU: &str = "Open…";
 pub const COMPARE_MENU: &str = "Compare with…";
 pub const NO_GRAPHICS: &str = "This computer's graphics cannot draw maps; update its graphics driver, or install a Vulkan driver.";

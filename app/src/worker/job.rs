@@ -1,7 +1,7 @@
 //! One piece of work: told about, and ended when nobody wants it any more.
 
 use super::Update;
-use crate::desk::{Problem, Severity};
+use crate::desk::Problem;
 use eframe::egui;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -100,15 +100,13 @@ impl Outbox {
     /// Puts up a warning for each sentence.
     pub fn warn(&self, title: &str, sentences: &[String]) {
         for text in sentences {
-            let (title, text) = (title.to_owned(), text.clone());
-            self.tell(Update::Problem(Problem { title, text, severity: Severity::Warning }));
+            self.tell(Update::Problem(Problem::warning(title, text)));
         }
     }
 
     /// Puts up an error.
     pub fn fail(&self, title: &str, error: &dyn std::fmt::Display) {
-        let (title, text) = (title.to_owned(), error.to_string());
-        self.tell(Update::Problem(Problem { title, text, severity: Severity::Error }));
+        self.tell(Update::Problem(Problem::error(title, error.to_string())));
     }
 
     /// Work that takes its time: told when it begins and ends, with its error put up, and ended where [`Outbox::tick`] finds
@@ -186,9 +184,7 @@ mod tests {
             Update::Problem(problem) => Some(problem),
             _ => None,
         });
-        let text = "no frames; scan again".to_owned();
-        let title = "Solving".to_owned();
-        assert_eq!(problem, Some(Problem { title, text, severity: Severity::Error }));
+        assert_eq!(problem, Some(Problem::error("Solving", "no frames; scan again")));
     }
 
     #[test]

@@ -23,6 +23,11 @@ pub(crate) struct Window {
 
 impl Window {
     pub(crate) fn new(size: [f32; 2], theme: egui::Theme) -> Self {
+        Self::with(size, theme, |_| {})
+    }
+
+    /// A window whose settings were changed by `change` when it was closed the last time.
+    pub(crate) fn with(size: [f32; 2], theme: egui::Theme, change: impl Fn(&mut Settings)) -> Self {
         let home = tempfile::tempdir().unwrap();
         let mut settings = Settings::load_from(&home.path().join("settings.toml"));
         settings.home = home.path().to_owned();
@@ -30,10 +35,12 @@ impl Window {
             egui::Theme::Dark => weavelight_app::settings::Theme::Dark,
             egui::Theme::Light => weavelight_app::settings::Theme::Light,
         };
+        change(&mut settings);
         let harness = Harness::builder()
             .with_size(size)
             .with_theme(theme)
             .with_max_steps(64)
+            .wgpu()
             .build_eframe(|cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings));
         Self { harness, home }
     }
@@ -62,6 +69,17 @@ impl Window {
         self.harness.state_mut().ask(Command::Open(rig));
         self.until("the rig is open", |app| app.desk().place.is_some());
         self.idle();
+    }
+
+    /// A scan that was killed after some of the simulator's frames.
+    pub(crate) fn killed_scan(&mut self, name: &str, frames: usize) {
+        self.scan_in_the_library(name);
+        let folder = self.rig().join("scans").join(name);
+        let mut session = weavelight::session::Session::load(&folder).unwrap();
+        for lost in session.frames.drain(frames..) {
+            std::fs::remove_file(folder.join(lost.file)).unwrap();
+        }
+        session.save().unwrap();
     }
 
     /// A scan as the simulator writes it.
@@ -128,18 +146,34 @@ impl Window {
     }
 }
 
-/// What `act` leads to, as a picture at two sizes and in both themes. Only one of the four is used beyond looking: they take
-/// their time.
+type Variant = (&'static str, egui::Theme, [f32; 2]);
+
+const VARIANTS: [Variant; 4] = [
+    ("dark", egui::Theme::Dark, WIDE),
+    ("light-small", egui::Theme::Light, SMALL),
+    ("light", egui::Theme::Light, WIDE),
+    ("dark-small", egui::Theme::Dark, SMALL),
+];
+
+/// What `act` leads to, as a picture at two sizes and in both themes.
 pub(crate) fn both_themes(name: &str, act: impl Fn(&mut Window)) {
+    pictures(name, &VARIANTS, |_| {}, act);
+}
+
+/// A state of a room: a picture of either size and either theme, which takes half the time. `change`: of the settings.
+pub(crate) fn state(name: &str, change: impl Fn(&mut Settings), act: impl Fn(&mut Window)) {
+    pictures(name, &VARIANTS[..2], change, act);
+}
+
+fn pictures(
+    name: &str,
+    variants: &[Variant],
+    change: impl Fn(&mut Settings),
+    act: impl Fn(&mut Window),
+) {
     let mut results = SnapshotResults::new();
-    let all = [
-        ("dark", egui::Theme::Dark, WIDE),
-        ("light", egui::Theme::Light, WIDE),
-        ("dark-small", egui::Theme::Dark, SMALL),
-        ("light-small", egui::Theme::Light, SMALL),
-    ];
-    for (variant, theme, size) in all {
-        let mut window = Window::new(size, theme);
+    for (variant, theme, size) in variants {
+        let mut window = Window::with(*size, *theme, &change);
         act(&mut window);
         window.harness.run();
         results.add(window.harness.try_snapshot(format!("{name}-{variant}")));

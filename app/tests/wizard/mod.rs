@@ -52,6 +52,8 @@ fn looks(window: &mut Window, name: &str, results: &mut SnapshotResults) {
         (0..4).for_each(|_| window.harness.step());
         results.add(window.harness.try_snapshot(format!("{name}-{variant}")));
     }
+    window.harness.set_size(desk::WIDE.into());
+    (0..4).for_each(|_| window.harness.step());
 }
 
 /// Every control says what it is.

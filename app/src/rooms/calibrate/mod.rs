@@ -12,6 +12,7 @@ pub use picture::{Marks, Picture};
 pub use task::{BOARDS, Pose, State, Step, TargetSettings, Task};
 pub use work::Memory;
 
+use crate::browse::Browse;
 use crate::desk::{Brake, Desk};
 use crate::texts::calibrate as texts;
 use crate::theme;
@@ -71,6 +72,7 @@ pub struct Calibrate {
     asked: bool,
     /// Go on by itself, on the simulated rig.
     auto: bool,
+    browse: Browse,
     view: view::View,
     /// What came of camera, colour, lights and check.
     figures: [Option<String>; 4],
@@ -144,7 +146,8 @@ impl Calibrate {
             return;
         }
         if !simulated {
-            view::targets(ui, task, &mut desk.settings.targets, desk.place.as_ref());
+            let targets = &mut desk.settings.targets;
+            view::targets(ui, task, targets, &mut self.browse, desk.place.as_ref());
         }
         self.buttons(ui, task, simulated, desk);
         ui.add_space(theme::GAP);

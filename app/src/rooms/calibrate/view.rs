@@ -2,6 +2,7 @@
 
 use super::picture::{Picture, paint_earlier};
 use super::task::{BOARDS, State, Step, TargetSettings, Task};
+use crate::browse::Browse;
 use crate::place::Place;
 use crate::texts::calibrate as texts;
 use crate::theme::{self, meaning};
@@ -189,6 +190,7 @@ pub(super) fn targets(
     ui: &mut egui::Ui,
     task: Task,
     targets: &mut TargetSettings,
+    browse: &mut Browse,
     place: Option<&Place>,
 ) {
     let last_light = place.map_or(0, |place| place.rig.lights.len().saturating_sub(1));
@@ -202,9 +204,7 @@ pub(super) fn targets(
             let label = ui.label(texts::CHART);
             let edit = egui::TextEdit::singleline(&mut targets.chart).desired_width(280.0);
             ui.add(edit).labelled_by(label.id).on_hover_text(texts::CHART_HINT);
-            if ui.button(texts::BROWSE).clicked()
-                && let Some(file) = rfd::FileDialog::new().pick_file()
-            {
+            if let Some(file) = browse.file(ui) {
                 targets.chart = file.display().to_string();
             }
         }

@@ -1,8 +1,8 @@
 //! The light over the cloth: a lamp in the hand, a sun, or one of the rig's own.
 
 use super::opened::Opened;
-use super::view::{Geometry, lamp_at, sun};
-use nalgebra::{Point3, UnitVector3};
+use super::view::{Geometry, first_lamp, lamp_over, sun};
+use nalgebra::Point3;
 use weavelight_calibration::description::{DirectionalLight, Light, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;
 
@@ -63,10 +63,7 @@ impl Default for Lamp {
 impl Lamp {
     /// Hangs the lamp where it lights a picture from its upper left, at a height that fits it.
     pub(super) fn hang_over(&mut self, geometry: &Geometry) {
-        let [width, height] = geometry.size().map(|length| length as f64);
-        let at = geometry.on_plane([0.25 * width, 0.25 * height]);
-        let across = geometry.on_plane([width, 0.0]) - geometry.on_plane([0.0, 0.0]);
-        (self.at_mm, self.height_mm) = ([at.x, at.y], 0.35 * across.norm());
+        (self.at_mm, self.height_mm) = first_lamp(geometry);
     }
 
     /// Where the lamp is.
@@ -92,14 +89,7 @@ impl Lamp {
                 }
             }
             (Kind::Sun, _) => sun(self.azimuth_deg, self.elevation_deg),
-            _ => {
-                let mut light = lamp_at(self.position_mm(geometry));
-                if let Light::Point(light) = &mut light {
-                    light.intensity = [(self.height_mm / 1000.0).powi(2); 3];
-                    light.axis = UnitVector3::new_unchecked(-geometry.plane().normal.into_inner());
-                }
-                light
-            }
+            _ => lamp_over(geometry, self.at_mm, self.height_mm),
         }
     }
 

@@ -24,6 +24,7 @@ mod work;
 pub use opened::{Capture, Opened};
 pub use work::Frames;
 
+use crate::browse::Browse;
 use crate::desk::Desk;
 use crate::rooms::Room;
 use crate::settings::SolveSettings;
@@ -133,6 +134,7 @@ pub struct Look {
     profile: Option<profile::Profile>,
     painting: Option<Painting>,
     path: String,
+    browse: Browse,
 }
 
 /// Another solution.
@@ -265,9 +267,7 @@ impl Look {
             let width = (ui.available_width() - 190.0).max(60.0);
             let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
             ui.add(field).labelled_by(label.id);
-            if ui.button(texts::BROWSE).clicked()
-                && let Some(folder) = rfd::FileDialog::new().pick_folder()
-            {
+            if let Some(folder) = self.browse.folder(ui) {
                 self.path = folder.display().to_string();
             }
             let named = !self.path.trim().is_empty();

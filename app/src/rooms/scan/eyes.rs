@@ -4,6 +4,7 @@
 use super::Told;
 use super::picture::{Thumb, thumb};
 use crate::place::Place;
+use crate::rooms::look::view::{Geometry, Maps};
 use crate::worker::{Outbox, Update};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -11,9 +12,10 @@ use std::thread::JoinHandle;
 use weavelight::device::camera::Settings;
 use weavelight::instrument::Calibration;
 use weavelight::raw::{Frame, Hint, decode};
-use weavelight::session::{Kind, Session};
+use weavelight::session::Session;
 use weavelight::solve::Exposure;
 use weavelight::solve::preview::{Accumulator, Scale};
+use weavelight_calibration::description::{Camera, Plane};
 
 /// A frame that is safe.
 #[derive(Debug)]
@@ -56,16 +58,19 @@ impl Drop for Eyes {
 
 fn watch(inbox: &Receiver<Sight>, place: &Place, folder: &Path, out: &Outbox) {
     let calibration = Calibration::load(&place.calibration()).ok();
-    let mut sums: Option<Accumulator> = None;
+    let mut sums: Option<Sums> = None;
     for sight in inbox {
         let Some(frame) = read(&sight.file) else { continue };
         let picture = thumb(&frame, sight.light, calibration.as_ref());
         let (light, drift_check) = (sight.light, sight.drift_check);
         out.tell(Update::Scan(Told::Frame(Box::new(Thumb { light, drift_check, picture }))));
         let Some(calibration) = &calibration else { continue };
-        let sums = sums.get_or_insert_with(|| accumulator(calibration, folder, &frame));
-        if !drift_check && add(sums, sight, frame).is_some() {
-            tell_preview(sums, out);
+        let sums = sums.get_or_insert_with(|| Sums::new(calibration, folder, &frame));
+        if !drift_check
+            && sums.add(sight, frame).is_some()
+            && let Some(maps) = sums.maps()
+        {
+            out.tell(Update::Scan(Told::Maps(Box::new(maps))));
         }
     }
 }
@@ -74,30 +79,43 @@ fn read(file: &Path) -> Option<Frame> {
     decode(&std::fs::read(file).ok()?, &Hint::default()).ok()
 }
 
-fn accumulator(calibration: &Calibration, folder: &Path, like: &Frame) -> Accumulator {
-    let plane = Session::load(folder).map(|session| session.plane_or_table());
-    let plane = plane.unwrap_or_else(|_| Session::new(folder, Kind::Swatch, "").plane_or_table());
-    let scale = match like.width.div_ceil(COLUMNS) {
-        0..2 => Scale::Full,
-        2..3 => Scale::Half,
-        3..6 => Scale::Quarter,
-        _ => Scale::Eighth,
-    };
-    Accumulator::new(calibration.clone(), plane, like, scale)
+/// The maps so far, and where their pixels are.
+struct Sums {
+    sums: Accumulator,
+    camera: Option<Camera>,
+    plane: Plane,
+    scale: Scale,
 }
 
-/// What does not fit is told by the solve, with its remedy.
-fn add(sums: &mut Accumulator, sight: Sight, frame: Frame) -> Option<()> {
-    let Settings { exposure_s, iso } = sight.settings;
-    let exposure = Exposure { frame, exposure_s, iso, path: sight.file };
-    match sight.light {
-        Some(light) => sums.add(light, exposure).ok(),
-        None => sums.add_ambient(exposure).ok(),
+impl Sums {
+    fn new(calibration: &Calibration, folder: &Path, like: &Frame) -> Self {
+        let plane = Session::load(folder).map(|session| session.plane_or_table());
+        let plane = plane.unwrap_or_else(|_| Plane::table());
+        let scale = match like.width.div_ceil(COLUMNS) {
+            0..2 => Scale::Full,
+            2..3 => Scale::Half,
+            3..6 => Scale::Quarter,
+            _ => Scale::Eighth,
+        };
+        let sums = Accumulator::new(calibration.clone(), plane.clone(), like, scale);
+        Self { sums, camera: calibration.camera.clone(), plane, scale }
     }
-}
 
-fn tell_preview(sums: &Accumulator, out: &Outbox) {
-    if let Ok(Some(preview)) = sums.preview() {
-        out.tell(Update::Scan(Told::Preview(Box::new(preview))));
+    /// What does not fit is told by the solve, with its remedy.
+    fn add(&mut self, sight: Sight, frame: Frame) -> Option<()> {
+        let Settings { exposure_s, iso } = sight.settings;
+        let exposure = Exposure { frame, exposure_s, iso, path: sight.file };
+        match sight.light {
+            Some(light) => self.sums.add(light, exposure).ok(),
+            None => self.sums.add_ambient(exposure).ok(),
+        }
+    }
+
+    fn maps(&self) -> Option<Maps> {
+        let preview = self.sums.preview().ok()??;
+        let size = [preview.normal.width, preview.normal.height];
+        let (camera, plane) = (self.camera.clone(), self.plane.clone());
+        let geometry = Geometry::new(size, camera, plane, self.scale as usize);
+        Some(Maps::of_preview(&preview, geometry))
     }
 }

@@ -2,28 +2,33 @@
 
 use super::{Ask, Order};
 use crate::desk::Desk;
-use crate::settings::{MethodName, NormalYName, SolveSettings};
+use crate::place::Place;
+use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
 use crate::worker::Command;
 use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui::{self, RichText};
+use serde::{Deserialize, Serialize};
 use weavelight::device::camera::Settings;
-use weavelight::device::scan::{Preview, Summary};
 use weavelight::instrument::CameraKind;
 use weavelight_sim::cloth::Preset;
 
-/// What the technician writes and chooses.
-#[derive(Debug)]
-pub(super) struct Form {
-    pub(super) name: String,
-    thickness_mm: f64,
-    find_exposure: bool,
-    exposure_s: f64,
-    iso: f64,
-    test_light: usize,
-    fabric: Preset,
+/// What the technician writes for a scan; remembered, so that the next day begins where this one ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FormSettings {
+    /// Of the swatch.
+    pub name: String,
+    /// Of the swatch, millimetres; 0: not measured.
+    pub thickness_mm: f64,
+    /// Whether test shots find the exposure.
+    pub find_exposure: bool,
+    /// Where they do not.
+    pub exposure_s: f64,
+    /// Sensitivity.
+    pub iso: f64,
 }
 
-impl Default for Form {
+impl Default for FormSettings {
     fn default() -> Self {
         Self {
             name: texts::FIRST_NAME.to_owned(),
@@ -31,30 +36,24 @@ impl Default for Form {
             find_exposure: true,
             exposure_s: 0.1,
             iso: 100.0,
-            test_light: 0,
-            fabric: Preset::Linen,
         }
     }
 }
 
-impl Form {
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        ui.add_space(theme::GAP);
-        let label = ui.label(texts::NAME);
-        let field = egui::TextEdit::singleline(&mut self.name).desired_width(f32::INFINITY);
-        ui.add(field).labelled_by(label.id);
-        egui::Grid::new("scan numbers").num_columns(2).show(ui, |ui| self.numbers(ui));
-        self.table(ui, desk);
-        ui.separator();
-        self.test(ui, desk);
-        ui.separator();
-        ui.collapsing(texts::SOLVING, |ui| solving(ui, &mut desk.settings.solve));
+impl FormSettings {
+    /// Counts the name on until no scan of `place` has it.
+    pub(super) fn next_free_name(&mut self, place: Option<&Place>) {
+        while is_taken(&self.name, place) {
+            self.name = next_name(&self.name);
+        }
     }
 
     fn numbers(&mut self, ui: &mut egui::Ui) {
         let label = ui.label(texts::THICKNESS);
         let thickness = egui::DragValue::new(&mut self.thickness_mm).range(0.0..=100.0).speed(0.05);
-        ui.add(thickness.suffix(" mm").max_decimals(2)).labelled_by(label.id);
+        let read = |text: &str| text.trim().trim_end_matches("mm").trim().parse().ok();
+        let thickness = thickness.custom_formatter(|mm, _| texts::thickness(mm));
+        ui.add(thickness.custom_parser(read)).labelled_by(label.id);
         ui.end_row();
         let label = ui.label(texts::EXPOSURE);
         ui.horizontal(|ui| {
@@ -68,6 +67,38 @@ impl Form {
         let iso = egui::DragValue::new(&mut self.iso).range(25.0..=25_600.0).speed(10.0);
         ui.add(iso.max_decimals(0)).labelled_by(label.id);
         ui.end_row();
+    }
+}
+
+/// Of the panel with the big button, points.
+pub(super) const BUTTON_HEIGHT: f32 = 104.0;
+
+/// What else can be chosen.
+#[derive(Debug)]
+pub(super) struct Form {
+    test_light: usize,
+    fabric: Preset,
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        Self { test_light: 0, fabric: Preset::Linen }
+    }
+}
+
+impl Form {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        ui.add_space(theme::GAP);
+        let label = ui.label(texts::NAME);
+        let form = &mut desk.settings.scan;
+        let field = egui::TextEdit::singleline(&mut form.name).desired_width(f32::INFINITY);
+        ui.add(field).labelled_by(label.id);
+        egui::Grid::new("scan numbers").num_columns(2).show(ui, |ui| form.numbers(ui));
+        self.table(ui, desk);
+        ui.separator();
+        self.test(ui, desk);
+        ui.separator();
+        ui.collapsing(texts::SOLVING, |ui| solving(ui, &mut desk.settings.solve));
     }
 
     /// What lies on a simulated table can be chosen.
@@ -90,7 +121,8 @@ impl Form {
         });
         if self.fabric != before {
             desk.ask(Command::Scan(Ask::LayOut(self.fabric)));
-            self.name = self.fabric.name().to_owned();
+            desk.settings.scan.name = self.fabric.name().to_owned();
+            desk.settings.scan.next_free_name(desk.place.as_ref());
         }
     }
 
@@ -106,58 +138,53 @@ impl Form {
             let light = egui::DragValue::new(&mut self.test_light).range(0..=most).speed(0.05);
             ui.add(light).labelled_by(label.id);
             if clicked {
-                let settings = Settings { exposure_s: self.exposure_s, iso: self.iso };
+                let FormSettings { exposure_s, iso, .. } = desk.settings.scan;
+                let settings = Settings { exposure_s, iso };
                 let light = self.test_light.min(most);
                 desk.ask(Command::Scan(Ask::TestShot { light, settings }));
             }
         });
     }
 
-    /// The big button. True when it is clicked.
-    pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk) -> bool {
+    /// The big button: scans, or, where that is `done`, clears the table for the next swatch. True when it is clicked.
+    pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk, done: bool) -> bool {
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
-        let button = widgets::primary(ui, texts::SCAN, size, self.can_begin(desk));
-        let clicked = button.on_hover_text(texts::SPACE).clicked();
-        let hint = if self.is_taken(desk) { texts::TAKEN } else { texts::SPACE };
+        let text = if done { texts::NEXT } else { texts::SCAN };
+        let clicked = widgets::primary(ui, text, size, can_go(desk, done)).clicked();
+        let taken = !done && is_taken(&desk.settings.scan.name, desk.place.as_ref());
+        let hint = match (desk.is_busy(), taken) {
+            (true, _) => texts::BUSY,
+            (_, true) => texts::TAKEN,
+            _ => texts::SPACE,
+        };
         ui.label(RichText::new(hint).small().weak());
         clicked
     }
+}
 
-    /// Whether a scan can begin.
-    pub(super) fn can_begin(&self, desk: &Desk) -> bool {
-        !desk.is_busy() && !self.name.trim().is_empty() && !self.is_taken(desk)
-    }
+/// Whether the big button can be pressed.
+pub(super) fn can_go(desk: &Desk, done: bool) -> bool {
+    let name = &desk.settings.scan.name;
+    let free = !name.trim().is_empty() && !is_taken(name, desk.place.as_ref());
+    !desk.is_busy() && (done || free)
+}
 
-    fn is_taken(&self, desk: &Desk) -> bool {
-        desk.place.as_ref().is_some_and(|place| place.scan(&self.name).exists())
+/// What to scan as the desk says.
+pub(super) fn order(desk: &Desk, resume: bool) -> Order {
+    let form = &desk.settings.scan;
+    Order {
+        name: form.name.trim().to_owned(),
+        thickness_mm: (form.thickness_mm > 0.0).then_some(form.thickness_mm),
+        exposure_s: (!form.find_exposure && !resume).then_some(form.exposure_s),
+        iso: form.iso,
+        resume,
+        solve: desk.settings.solve,
     }
+}
 
-    pub(super) fn order(&self, desk: &Desk, resume: bool) -> Order {
-        Order {
-            name: self.name.trim().to_owned(),
-            thickness_mm: (self.thickness_mm > 0.0).then_some(self.thickness_mm),
-            exposure_s: (!self.find_exposure && !resume).then_some(self.exposure_s),
-            iso: self.iso,
-            resume,
-            solve: desk.settings.solve,
-        }
-    }
-
-    /// A test shot's better exposure becomes the next one's.
-    pub(super) fn hear(&mut self, shot: &Preview) {
-        self.exposure_s = shot.better_exposure_s.unwrap_or(shot.settings.exposure_s);
-    }
-
-    pub(super) fn keep_exposure(&mut self, summary: &Summary) {
-        if let Some(settings) = summary.settings {
-            self.exposure_s = settings.exposure_s;
-        }
-    }
-
-    /// The next swatch's name: the number at its end, counted on.
-    pub(super) fn next_name(&mut self) {
-        self.name = next_name(&self.name);
-    }
+/// Whether a scan has this name already.
+pub(super) fn is_taken(name: &str, place: Option<&Place>) -> bool {
+    place.is_some_and(|place| place.scan(name).exists())
 }
 
 fn solving(ui: &mut egui::Ui, settings: &mut SolveSettings) {
@@ -170,6 +197,18 @@ fn solving(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     if ui.checkbox(&mut down, texts::NORMAL_Y_DOWN).changed() {
         settings.normal_y = if down { NormalYName::Down } else { NormalYName::Up };
     }
+    let devices = [DeviceName::Auto, DeviceName::Cpu, DeviceName::Gpu];
+    let name = |device: DeviceName| texts::DEVICES[device as usize];
+    ui.horizontal(|ui| {
+        let label = ui.label(texts::DEVICE);
+        let choice = egui::ComboBox::from_id_salt("device").selected_text(name(settings.device));
+        let shown = choice.show_ui(ui, |ui| {
+            for device in devices {
+                ui.selectable_value(&mut settings.device, device, name(device));
+            }
+        });
+        shown.response.labelled_by(label.id);
+    });
 }
 
 fn next_name(name: &str) -> String {

@@ -10,7 +10,7 @@ pub(super) const HEIGHT: f32 = 132.0;
 
 pub(super) fn ui(ui: &mut egui::Ui, look: &Look) {
     ui.horizontal(|ui| {
-        let size = vec2((ui.available_width() - 240.0).max(160.0), HEIGHT - 28.0);
+        let size = vec2((ui.available_width() - 270.0).max(160.0), HEIGHT - 28.0);
         let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
         let name = texts::HISTOGRAM;
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));

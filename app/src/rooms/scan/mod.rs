@@ -18,7 +18,8 @@ use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
 use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui;
-use form::Form;
+pub use form::FormSettings;
+use form::{Form, order};
 use std::path::PathBuf;
 use strip::Strip;
 use view::View;
@@ -83,7 +84,7 @@ pub enum Told {
     /// A frame that is safe.
     Frame(Box<Thumb>),
     /// Maps from the frames so far.
-    Preview(Box<weavelight::solve::preview::Preview>),
+    Maps(Box<look::view::Maps>),
     /// All frames are there.
     Complete(Box<Summary>),
     /// The solution stands.
@@ -123,6 +124,8 @@ pub struct Scan {
     strip: Strip,
     view: View,
     unfinished: Option<(String, usize)>,
+    /// Whether that was not drawn yet.
+    offer_is_new: bool,
 }
 
 impl Scan {
@@ -130,18 +133,15 @@ impl Scan {
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         self.keys(ui, desk);
         let pane = egui::Panel::left("scan form").exact_size(292.0).resizable(false);
-        pane.show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
-        });
+        pane.show(ui, |ui| self.left(ui, desk));
         let lights = desk.place.as_ref().map_or(0, |place| place.rig.lights.len());
         egui::Panel::bottom("scan strip").exact_size(strip::HEIGHT).show(ui, |ui| {
             self.strip.ui(ui, lights);
         });
         egui::CentralPanel::default().show(ui, |ui| {
             self.result(ui, desk);
-            let running = matches!(self.stage, Stage::Scanning | Stage::Paused);
             let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
-            match (running, calibrated) {
+            match (self.is_running(), calibrated) {
                 (false, false) => self.ask_to_calibrate(ui, desk),
                 (true, true) => self.view.ui(ui, texts::MAPS_COME),
                 (true, false) => self.view.ui(ui, texts::NO_MAPS),
@@ -160,17 +160,45 @@ impl Scan {
         }
     }
 
+    /// The form, and below it, whatever else there is, what the room is about.
     fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        ui.heading(crate::texts::rooms::SCAN);
-        self.offer_unfinished(ui, desk);
-        let running = matches!(self.stage, Stage::Scanning | Stage::Paused);
-        ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
-        ui.add_space(theme::WIDE_GAP);
-        if running {
-            self.running(ui, desk);
-        } else if self.form.button(ui, desk) {
-            self.begin(self.form.order(desk, false), desk);
+        let running = self.is_running();
+        egui::Panel::bottom("scan buttons").exact_size(form::BUTTON_HEIGHT).show(ui, |ui| {
+            ui.add_space(theme::GAP);
+            if running {
+                self.running(ui, desk);
+            } else if self.form.button(ui, desk, self.is_done(desk)) {
+                self.go(desk);
+            }
+        });
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                ui.heading(crate::texts::rooms::SCAN);
+                self.offer_unfinished(ui, desk);
+                ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
+            });
+        });
+    }
+
+    fn is_running(&self) -> bool {
+        matches!(self.stage, Stage::Scanning | Stage::Paused)
+    }
+
+    /// Whether the swatch on the table is scanned: what comes next is another one.
+    fn is_done(&self, desk: &Desk) -> bool {
+        let done = matches!(self.stage, Stage::Scanned(_) | Stage::Solved { .. });
+        done && form::is_taken(&desk.settings.scan.name, desk.place.as_ref())
+    }
+
+    /// What the big button does.
+    fn go(&mut self, desk: &mut Desk) {
+        if !self.is_done(desk) {
+            return self.begin(order(desk, false), desk);
         }
+        desk.settings.scan.next_free_name(desk.place.as_ref());
+        self.stage = Stage::Ready;
+        self.strip = Strip::default();
+        self.view.begin();
     }
 
     fn running(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
@@ -203,9 +231,14 @@ impl Scan {
             ui.set_width(ui.available_width());
             ui.label(egui::RichText::new(texts::unfinished(&name, frames)).strong());
             ui.horizontal(|ui| {
-                if ui.button(texts::RESUME).clicked() {
-                    self.form.name = name.clone();
-                    self.begin(self.form.order(desk, true), desk);
+                let resume = ui.button(texts::RESUME);
+                if std::mem::take(&mut self.offer_is_new) {
+                    // One key goes on.
+                    resume.request_focus();
+                }
+                if resume.clicked() {
+                    desk.settings.scan.name = name.clone();
+                    self.begin(order(desk, true), desk);
                 }
                 if ui.button(texts::LEAVE).clicked() {
                     self.unfinished = None;
@@ -232,7 +265,7 @@ impl Scan {
             Stage::Solved { report, .. } => texts::solved(report),
             _ => return,
         };
-        let name = self.form.name.clone();
+        let name = desk.settings.scan.name.clone();
         ui.horizontal_wrapped(|ui| {
             ui.label(egui::RichText::new(text).strong());
             if let Stage::Solved { solution, .. } = &self.stage
@@ -248,22 +281,17 @@ impl Scan {
                     let scan = place.scan(&name);
                     desk.ask(Command::Scan(Ask::ThrowAway(scan)));
                 }
-                self.begin(self.form.order(desk, false), desk);
-            } else if !desk.is_busy() && ui.button(texts::NEXT).clicked() {
-                self.form.next_name();
-                self.stage = Stage::Ready;
-                self.strip = Strip::default();
-                self.view.begin();
+                self.begin(order(desk, false), desk);
             }
         });
     }
 
-    /// Space scans, wherever no text is being written.
+    /// Space does what the big button does, wherever no text is being written.
     fn keys(&mut self, ui: &egui::Ui, desk: &mut Desk) {
         let free = !ui.ctx().egui_wants_keyboard_input();
         let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
-        if space && self.stage == Stage::Ready && self.form.can_begin(desk) {
-            self.begin(self.form.order(desk, false), desk);
+        if space && !self.is_running() && form::can_go(desk, self.is_done(desk)) {
+            self.go(desk);
         }
     }
 
@@ -271,7 +299,9 @@ impl Scan {
     pub fn hear(&mut self, told: Told, desk: &mut Desk) {
         match told {
             Told::TestShot(shot) => {
-                self.form.hear(&shot);
+                // A test shot's better exposure becomes the next one's.
+                let better = shot.better_exposure_s;
+                desk.settings.scan.exposure_s = better.unwrap_or(shot.settings.exposure_s);
                 self.view.show_test_shot(shot);
             }
             Told::Taking(frame) => {
@@ -280,9 +310,11 @@ impl Scan {
             }
             Told::Paused => self.stage = Stage::Paused,
             Told::Frame(thumb) => self.strip.add(*thumb),
-            Told::Preview(preview) => self.view.show_preview(&preview),
+            Told::Maps(maps) => self.view.show_maps(maps),
             Told::Complete(summary) => {
-                self.form.keep_exposure(&summary);
+                if let Some(used) = summary.settings {
+                    desk.settings.scan.exposure_s = used.exposure_s;
+                }
                 self.strip.done();
                 self.stage = Stage::Scanned(summary);
             }
@@ -296,6 +328,7 @@ impl Scan {
                     self.stage = Stage::Ready;
                     self.strip.done();
                 }
+                self.offer_is_new = found.is_some();
                 self.unfinished = found;
             }
         }
@@ -304,6 +337,7 @@ impl Scan {
     /// Another rig: nothing of the last one stays.
     pub fn reset(&mut self, desk: &mut Desk) {
         *self = Self::default();
+        desk.settings.scan.next_free_name(desk.place.as_ref());
         desk.ask(Command::Scan(Ask::LookForUnfinished));
     }
 }

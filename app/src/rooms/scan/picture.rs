@@ -44,18 +44,6 @@ pub fn test_shot(frame: &Frame, longest_side: usize, mark_clipped: bool) -> Colo
     shown
 }
 
-/// Normals as the field shows them: x, y, z from -1 to 1 as red, green, blue; grey where there are none.
-pub fn normals(normal: &Image<[f32; 3]>) -> ColorImage {
-    let color = |n: &[f32; 3]| match n {
-        [0.0, 0.0, 0.0] => Color32::from_gray(60),
-        n => {
-            let [r, g, b] = n.map(|c| (127.5 * (c + 1.0)).round() as u8);
-            Color32::from_rgb(r, g, b)
-        }
-    };
-    image(normal, color)
-}
-
 /// Linear colours for the screen, each channel times its gain.
 pub fn picture(linear: &Image<[f32; 3]>, gain: [f32; 3]) -> ColorImage {
     image(linear, |rgb| {
@@ -88,14 +76,6 @@ fn grey_world(picture: &Image<[f32; 3]>) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn normals_look_as_everywhere() {
-        let data = vec![[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0; 3]];
-        let shown = normals(&Image { width: 3, height: 1, data });
-        let expected = [(128, 128, 255), (255, 128, 128), (60, 60, 60)];
-        assert_eq!(shown.pixels, expected.map(|(r, g, b)| Color32::from_rgb(r, g, b)));
-    }
 
     #[test]
     fn an_unmeasured_lights_picture_is_grey_on_average() {

@@ -50,7 +50,7 @@ impl Strip {
             ui.horizontal_centered(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.5 * theme::GAP;
                 let room = ui.available_width() / (lights + 1).max(1) as f32 - 0.5 * theme::GAP;
-                let width = room.clamp(50.0, 116.0);
+                let width = room.clamp(40.0, 116.0);
                 cells.for_each(|light| self.cell(ui, light, width));
             });
         });
@@ -76,10 +76,20 @@ impl Strip {
             _ => Stroke::new(1.0, visuals.weak_text_color()),
         };
         painter.rect_stroke(picture, 4.0, stroke, StrokeKind::Inside);
-        let below = egui::pos2(rect.center().x, picture.bottom() + 2.0);
-        let font = egui::FontId::proportional(12.0);
-        let text = painter.text(below, egui::Align2::CENTER_TOP, &name, font, visuals.text_color());
+        // Narrow cells have room for the number alone.
+        let number = light.filter(|_| width < 64.0).map(|light| light.to_string());
         let sign = if taking { Some(Sign::Lit) } else { frame.map(|_| Sign::Good) };
+        // The sign stands before the text: both together are in the middle.
+        let beside = if sign.is_some() { 6.0 } else { 0.0 };
+        let below = egui::pos2(rect.center().x + beside, picture.bottom() + 2.0);
+        let font = egui::FontId::proportional(12.0);
+        let text = painter.text(
+            below,
+            egui::Align2::CENTER_TOP,
+            number.as_ref().unwrap_or(&name),
+            font,
+            visuals.text_color(),
+        );
         if let Some(sign) = sign {
             sign.paint(painter, text.left_center() - vec2(9.0, 0.0), 5.0);
         }

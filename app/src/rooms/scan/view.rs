@@ -1,11 +1,14 @@
-//! The large picture: a test shot with its histogram and advice, or the maps as far as the frames go.
+//! The large picture: a test shot with its histogram and advice, or the maps as far as the frames go, under a lamp that the
+//! mouse carries.
 
 use super::histogram;
-use super::picture::{normals, picture, test_shot};
+use super::picture::test_shot;
+use crate::rooms::look::view::{
+    Appearance, Canvas, Geometry, MapView, Maps, Mode, first_lamp, lamp_over,
+};
 use crate::texts::scan as texts;
-use eframe::egui::{self, ColorImage, RichText, TextureHandle, TextureOptions};
+use eframe::egui::{self, PointerButton, RichText, TextureHandle, TextureOptions};
 use weavelight::device::scan;
-use weavelight::solve::preview::Preview;
 
 /// Longest side of a test shot on the screen, pixels.
 const TEST_SHOT: usize = 1600;
@@ -15,20 +18,31 @@ const TEST_SHOT: usize = 1600;
 pub(super) struct View {
     shot: Option<(Box<scan::Preview>, Option<TextureHandle>)>,
     mark_clipped: bool,
-    maps: Option<Maps>,
-    fresh: Option<[ColorImage; 2]>,
+    maps: Option<Box<Maps>>,
+    map_view: MapView,
     layer: Layer,
-}
-
-struct Maps {
-    textures: [TextureHandle; 2],
+    /// Over which place of the table the lamp hangs, and how high, millimetres.
+    lamp: Option<([f64; 2], f64)>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Layer {
     #[default]
+    Relit,
     Normal,
     Albedo,
+}
+
+impl Layer {
+    const ALL: [Layer; 3] = [Layer::Relit, Layer::Normal, Layer::Albedo];
+
+    fn mode(self) -> Mode {
+        match self {
+            Layer::Relit => Mode::Relit,
+            Layer::Normal => Mode::Normal,
+            Layer::Albedo => Mode::Albedo,
+        }
+    }
 }
 
 impl std::fmt::Debug for View {
@@ -38,9 +52,10 @@ impl std::fmt::Debug for View {
 }
 
 impl View {
-    /// A new scan: the old pictures go.
+    /// A new scan: the old pictures go; lamp and layer stay.
     pub(super) fn begin(&mut self) {
-        *self = Self { layer: self.layer, mark_clipped: self.mark_clipped, ..Self::default() };
+        (self.shot, self.maps) = (None, None);
+        self.map_view = MapView::default();
     }
 
     pub(super) fn show_test_shot(&mut self, shot: Box<scan::Preview>) {
@@ -48,9 +63,9 @@ impl View {
         self.shot = Some((shot, None));
     }
 
-    pub(super) fn show_preview(&mut self, preview: &Preview) {
+    pub(super) fn show_maps(&mut self, maps: Box<Maps>) {
         self.shot = None;
-        self.fresh = Some([normals(&preview.normal), picture(&preview.albedo, [1.0; 3])]);
+        self.maps = Some(maps);
     }
 
     pub(super) fn has_test_shot(&self) -> bool {
@@ -59,29 +74,41 @@ impl View {
 
     /// Draws it; where there is nothing, `empty` says why.
     pub(super) fn ui(&mut self, ui: &mut egui::Ui, empty: &str) {
-        if let Some([normal, albedo]) = self.fresh.take() {
-            let load =
-                |name: &str, image| ui.ctx().load_texture(name, image, TextureOptions::LINEAR);
-            self.maps = Some(Maps { textures: [load("normal", normal), load("albedo", albedo)] });
-        }
-        match (&self.shot, &self.maps) {
+        match (&self.shot, self.maps.take()) {
             (Some(_), _) => self.test_shot(ui),
-            (None, Some(_)) => self.maps(ui),
+            (None, Some(maps)) => {
+                self.show(ui, &maps);
+                self.maps = Some(maps);
+            }
             (None, None) => nothing_yet(ui, empty),
         }
     }
 
-    fn maps(&mut self, ui: &mut egui::Ui) {
+    fn show(&mut self, ui: &mut egui::Ui, maps: &Maps) {
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut self.layer, Layer::Normal, texts::NORMALS);
-            ui.selectable_value(&mut self.layer, Layer::Albedo, texts::ALBEDO);
+            for (layer, name) in Layer::ALL.into_iter().zip(texts::LAYERS) {
+                ui.selectable_value(&mut self.layer, layer, name);
+            }
+            let how = if self.layer == Layer::Relit { texts::DRAG_LIGHT } else { texts::DRAG_MAPS };
+            ui.add(egui::Label::new(RichText::new(how).small().weak()).truncate());
         });
-        if let Some(maps) = &self.maps {
-            let (texture, name) = match self.layer {
-                Layer::Normal => (&maps.textures[0], texts::NORMALS),
-                Layer::Albedo => (&maps.textures[1], texts::ALBEDO),
-            };
-            fit(ui, texture, name);
+        let (at_mm, height_mm) = *self.lamp.get_or_insert_with(|| first_lamp(&maps.geometry));
+        let light = lamp_over(&maps.geometry, at_mm, height_mm);
+        let appearance = Appearance { light, ..Appearance::of(self.layer.mode()) };
+        let drag_pans = self.layer != Layer::Relit;
+        let canvas = Canvas { maps, appearance: &appearance, name: texts::MAPS, drag_pans };
+        let shown = self.map_view.show(ui, &canvas);
+        let carried = !drag_pans && shown.response.dragged_by(PointerButton::Primary);
+        if let Some(pixel) = shown.pixel_under_mouse().filter(|_| carried) {
+            self.carry_lamp(pixel, &maps.geometry);
+            ui.ctx().request_repaint();
+        }
+    }
+
+    fn carry_lamp(&mut self, pixel: [f64; 2], geometry: &Geometry) {
+        let under = geometry.on_plane(pixel);
+        if let Some((at_mm, _)) = &mut self.lamp {
+            *at_mm = [under.x, under.y];
         }
     }
 

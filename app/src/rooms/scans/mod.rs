@@ -5,6 +5,7 @@ mod work;
 
 pub use list::{Entry, incomplete};
 
+use crate::browse::Browse;
 use crate::desk::Desk;
 use crate::rooms::{Room, look, scan};
 use crate::worker::{Command, Outbox, Tools};
@@ -57,6 +58,7 @@ pub struct Scans {
     chosen: Option<PathBuf>,
     pictures: HashMap<PathBuf, Picture>,
     export_to: String,
+    browse: Browse,
     said: Option<String>,
     /// Whether the list is as the folder was when the room was entered.
     fresh: bool,
@@ -252,9 +254,7 @@ impl Scans {
         let field = egui::TextEdit::singleline(&mut self.export_to).desired_width(f32::INFINITY);
         ui.add(field).labelled_by(label.id);
         ui.horizontal(|ui| {
-            if ui.button(crate::texts::welcome::BROWSE).clicked()
-                && let Some(folder) = rfd::FileDialog::new().pick_folder()
-            {
+            if let Some(folder) = self.browse.folder(ui) {
                 self.export_to = folder.join(format!("{} maps", entry.name)).display().to_string();
             }
             if ui.add_enabled(!desk.is_busy(), egui::Button::new(texts::EXPORT)).clicked() {

@@ -1,5 +1,6 @@
 //! What of the maps is shown, and under which light.
 
+use super::geometry::Geometry;
 use super::pyramid::Pyramid;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::sync::Arc;
@@ -126,6 +127,25 @@ pub fn lamp_at(position_mm: Point3<f64>) -> Light {
         exponent: 0.0,
         intensity: [height_m * height_m; 3],
     })
+}
+
+/// A lamp in the hand: over a place of the plane (rig frame, millimetres), so high; white right under it is white.
+pub fn lamp_over(geometry: &Geometry, at_mm: [f64; 2], height_mm: f64) -> Light {
+    let plane = geometry.plane();
+    let mut light = lamp_at(Point3::new(at_mm[0], at_mm[1], plane.point_mm.z + height_mm));
+    if let Light::Point(light) = &mut light {
+        light.intensity = [(height_mm / 1000.0).powi(2); 3];
+        light.axis = UnitVector3::new_unchecked(-plane.normal.into_inner());
+    }
+    light
+}
+
+/// Where a lamp hangs that lights a picture from its upper left, and at which height: one that fits its size, millimetres.
+pub fn first_lamp(geometry: &Geometry) -> ([f64; 2], f64) {
+    let [width, height] = geometry.size().map(|length| length as f64);
+    let at = geometry.on_plane([0.25 * width, 0.25 * height]);
+    let across = geometry.on_plane([width, 0.0]) - geometry.on_plane([0.0, 0.0]);
+    ([at.x, at.y], 0.35 * across.norm())
 }
 
 /// The sun: `azimuth_deg` counter-clockwise from the picture's right, `elevation_deg` over the table.

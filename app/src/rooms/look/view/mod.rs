@@ -13,7 +13,9 @@ pub mod scales;
 pub mod shade;
 mod viewport;
 
-pub use appearance::{Appearance, Compose, Mode, Scales, Side, lamp_at, sun};
+pub use appearance::{
+    Appearance, Compose, Mode, Scales, Side, first_lamp, lamp_at, lamp_over, sun,
+};
 pub use geometry::Geometry;
 pub use gpu::install;
 pub use maps::{Maps, Sample, normal_of, picture, surface};

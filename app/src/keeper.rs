@@ -1,0 +1,115 @@
+//! Keeps the settings when they change, not only when the window closes: one that is killed forgets nothing. A thread of its
+//! own, so that no frame waits for the disk.
+
+use crate::settings::Settings;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// So long nothing must have changed: a slider that is dragged changes them with every frame.
+const QUIET: Duration = Duration::from_millis(300);
+
+/// Keeps settings.
+#[derive(Debug)]
+pub struct Keeper {
+    /// As they are kept, or will soon be.
+    known: Settings,
+    changes: Option<Sender<Settings>>,
+    troubles: Receiver<String>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Keeper {
+    /// Begins with settings as they are on the disk.
+    pub fn start(known: Settings) -> Self {
+        let (changes, inbox) = mpsc::channel();
+        let (outbox, troubles) = mpsc::channel();
+        let thread = Some(std::thread::spawn(move || keep(&inbox, &outbox)));
+        Self { known, changes: Some(changes), troubles, thread }
+    }
+
+    /// Keeps them where they differ from what is kept.
+    pub fn look_at(&mut self, settings: &Settings) {
+        if *settings != self.known {
+            self.known = settings.clone();
+            // The thread lives as long as this value.
+            let _ = self.changes.as_ref().map(|changes| changes.send(settings.clone()));
+        }
+    }
+
+    /// Why they could not be kept, once.
+    pub fn trouble(&self) -> Option<String> {
+        self.troubles.try_recv().ok()
+    }
+}
+
+impl Drop for Keeper {
+    /// Returns when the last change is on the disk.
+    fn drop(&mut self) {
+        self.changes = None;
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+fn keep(inbox: &Receiver<Settings>, troubles: &Sender<String>) {
+    while let Ok(mut newest) = inbox.recv() {
+        loop {
+            match inbox.recv_timeout(QUIET) {
+                Ok(newer) => newest = newer,
+                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        if let Err(error) = newest.save() {
+            // There may be nobody left to be told.
+            let _ = troubles.send(error.to_string());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Instant;
+
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    #[test]
+    fn a_change_is_kept_while_the_window_is_open_and_the_last_one_when_it_closes() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        let mut settings = Settings::load_from(&file);
+        let mut keeper = Keeper::start(settings.clone());
+        keeper.look_at(&settings);
+        settings.scale = 1.25;
+        keeper.look_at(&settings);
+        let begun = Instant::now();
+        while Settings::load_from(&file) != settings {
+            assert!(begun.elapsed() < PATIENCE, "not kept");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        settings.scale = 2.0;
+        keeper.look_at(&settings);
+        drop(keeper);
+        assert_eq!(Settings::load_from(&file), settings);
+    }
+
+    #[test]
+    fn what_cannot_be_kept_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let blocked = folder.path().join("a file");
+        std::fs::write(&blocked, "").unwrap();
+        let mut settings = Settings::load_from(&blocked.join("settings.toml"));
+        let mut keeper = Keeper::start(settings.clone());
+        settings.scale = 1.25;
+        keeper.look_at(&settings);
+        let begun = Instant::now();
+        let trouble = loop {
+            assert!(begun.elapsed() < PATIENCE, "not told");
+            if let Some(trouble) = keeper.trouble() {
+                break trouble;
+            }
+            std::thread::yield_now();
+        };
+        assert!(trouble.contains("settings.toml"), "{trouble}");
+    }
+}
