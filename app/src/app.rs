@@ -97,6 +97,7 @@ impl App {
                 self.rig.reset(desk);
                 self.calibrate.reset();
             }
+            Update::CalibrationAge(days) => desk.calibration_age_days = days,
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),
             Update::Scan(told) => self.scan.hear(told, desk),

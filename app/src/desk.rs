@@ -13,6 +13,8 @@ pub struct Desk {
     pub settings: Settings,
     /// The rig that is open.
     pub place: Option<Place>,
+    /// How old its calibration is; `None` where there is none.
+    pub calibration_age_days: Option<i64>,
     /// What the worker is doing.
     pub activity: Option<Activity>,
     /// What went wrong and nobody has put away yet; the newest last.
@@ -103,11 +105,18 @@ impl Desk {
         Self {
             settings,
             place: None,
+            calibration_age_days: None,
             activity: None,
             problems: Vec::new(),
             asked: Vec::new(),
             brakes: Vec::new(),
         }
+    }
+
+    /// Age of a calibration that counts as too old to go on with, days.
+    pub fn expired_days(&self) -> Option<i64> {
+        let limit = self.settings.targets.expires_after_days;
+        self.calibration_age_days.filter(|days| *days > limit)
     }
 
     /// Leaves something to be done.

@@ -1,7 +1,7 @@
 //! The folders of one rig: everything that belongs to it lies beside its `rig.toml`.
 
 use std::path::{Path, PathBuf};
-use weavelight::instrument::Rig;
+use weavelight::instrument::{Calibration, Rig};
 
 /// Name of the rig's file.
 pub const RIG_FILE: &str = "rig.toml";
@@ -42,6 +42,11 @@ impl Place {
         self.calibration().join(weavelight::instrument::LIGHTS_FILE).exists()
     }
 
+    /// Age of the oldest part of the calibration, days; `None` where there is none that can be read.
+    pub fn calibration_age_days(&self) -> Option<i64> {
+        Calibration::load(&self.calibration()).ok().as_ref().and_then(age_days)
+    }
+
     /// Capture sessions of calibration targets.
     pub fn targets(&self) -> PathBuf {
         self.folder.join("targets")
@@ -61,6 +66,14 @@ impl Place {
     pub fn solution(&self, scan: &Path) -> PathBuf {
         self.folder.join("solutions").join(scan.file_name().unwrap_or_default())
     }
+}
+
+/// Age of a calibration's oldest part, days; `None` where none says when it was made.
+pub fn age_days(calibration: &Calibration) -> Option<i64> {
+    let of = &calibration.provenance;
+    let parts = [of.camera.as_ref(), of.color.as_ref(), of.lights.as_ref()];
+    let oldest = parts.into_iter().flatten().filter_map(|part| part.created).min()?;
+    Some(jiff::Timestamp::now().duration_since(oldest).as_hours() / 24)
 }
 
 /// A swatch's name as a folder's: letters, digits, spaces and `-_.`; everything else becomes `-`.

@@ -323,6 +323,8 @@ pub mod scan {
     /// The empty room without a calibration.
     pub const NOT_CALIBRATED: &str =
         "This rig is not calibrated yet: scans can be taken, but maps need a calibration";
+    /// Where the calibration is old.
+    pub const TO_CALIBRATE: &str = "Go and check it";
     /// The way out.
     pub const CALIBRATE: &str = "Calibrate it";
 

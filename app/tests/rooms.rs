@@ -131,7 +131,7 @@ fn what_went_wrong_is_shown_with_its_remedy() {
 
 #[test]
 fn a_frame_that_clips_is_marked_and_the_remedy_named() {
-    let long = |settings: &mut Settings| settings.scan.exposure_s = 0.55;
+    let long = |settings: &mut Settings| settings.scan.exposure_s = 1.1;
     desk::state("clipped", long, |window| {
         window.open_small_rig();
         window.enter(Room::Scan);
@@ -168,6 +168,26 @@ fn a_rig_without_calibration_leads_to_it() {
             window.open_small_rig();
             window.enter(Room::Scan);
             window.until_label("Calibrate it");
+            window.idle();
+        },
+    );
+}
+
+#[test]
+fn an_old_calibration_is_told_where_it_is_used() {
+    desk::state(
+        "expired",
+        |_| {},
+        |window| {
+            window.open_small_rig();
+            let file = window.rig().join("calibration/lights.toml");
+            let days = jiff::SignedDuration::from_hours(24 * 200 + 1);
+            let made = format!("[provenance]\ncreated = {}", jiff::Timestamp::now() - days);
+            let text = std::fs::read_to_string(&file).unwrap().replace("[provenance]", &made);
+            std::fs::write(&file, text).unwrap();
+            window.open_small_rig();
+            window.enter(Room::Scan);
+            window.until_label("Go and check it");
             window.idle();
         },
     );

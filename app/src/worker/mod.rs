@@ -63,6 +63,8 @@ pub enum Update {
     GoTo(Room),
     /// A rig is open.
     Opened(Box<Place>),
+    /// How old its calibration is, days.
+    CalibrationAge(Option<i64>),
     /// For the Rig room.
     Rig(rig::Told),
     /// For the Calibrate room.

@@ -16,7 +16,9 @@ pub(super) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
         Ok(place) => {
             tools.instruments = None;
             tools.place = Some(place.clone());
+            let age_days = place.calibration_age_days();
             out.tell(Update::Opened(Box::new(place)));
+            out.tell(Update::CalibrationAge(age_days));
         }
         Err(error) => out.fail(texts::OPENING, &error),
     }

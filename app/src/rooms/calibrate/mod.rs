@@ -201,6 +201,7 @@ impl Calibrate {
         match told {
             Told::State(state) => {
                 let task = state.next();
+                desk.calibration_age_days = state.age_days;
                 self.state = Some(state);
                 match (self.auto, task) {
                     (true, Task::Done | Task::Fit(_)) => self.auto = false,

@@ -442,7 +442,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
         chart: is_complete(&place.targets().join(GREY), &place.rig),
         fresh: fresh(place, calibration.as_ref(), &sheets),
         passed: passed.map(|(_, passed)| *passed).filter(|_| sheets.contains(&Pose::Check)),
-        age_days: calibration.as_ref().and_then(age_days),
+        age_days: calibration.as_ref().and_then(crate::place::age_days),
         history: history::entries(place),
         sheets,
         status,
@@ -495,12 +495,4 @@ fn fresh(place: &Place, calibration: Option<&Calibration>, sheets: &[Pose]) -> [
         from(of.color.as_ref(), &[GREY.to_owned()]),
         from(of.lights.as_ref(), &folders) && !stale,
     ]
-}
-
-/// Days since the oldest part was made.
-fn age_days(calibration: &Calibration) -> Option<i64> {
-    let of = &calibration.provenance;
-    let parts = [of.camera.as_ref(), of.color.as_ref(), of.lights.as_ref()];
-    let oldest = parts.into_iter().flatten().filter_map(|part| part.created).min()?;
-    Some(jiff::Timestamp::now().duration_since(oldest).as_hours() / 24)
 }

@@ -175,6 +175,7 @@ impl Scan {
             egui::ScrollArea::vertical().show(ui, |ui| {
                 ui.heading(crate::texts::rooms::SCAN);
                 self.offer_unfinished(ui, desk);
+                tell_expired(ui, desk);
                 ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
             });
         });
@@ -340,6 +341,21 @@ impl Scan {
         desk.settings.scan.next_free_name(desk.place.as_ref());
         desk.ask(Command::Scan(Ask::LookForUnfinished));
     }
+}
+
+/// An old calibration makes maps that nobody should trust blindly.
+fn tell_expired(ui: &mut egui::Ui, desk: &mut Desk) {
+    let Some(days) = desk.expired_days() else { return };
+    ui.horizontal_top(|ui| {
+        widgets::Sign::Warning.ui(ui);
+        ui.vertical(|ui| {
+            ui.add(egui::Label::new(crate::texts::calibrate::expired(days)).wrap());
+            if ui.small_button(texts::TO_CALIBRATE).clicked() {
+                desk.go_to(Room::Calibrate);
+            }
+        });
+    });
+    ui.add_space(theme::GAP);
 }
 
 /// The worker's part.
