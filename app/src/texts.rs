@@ -372,14 +372,15 @@ pub mod scan {
         format!("{} frames{exposure} in {:.0} s", summary.frames, summary.seconds.total)
     }
 
-    /// A solution.
-    pub fn solved(report: &Report) -> String {
+    /// A solution; `expected_deg`: expected error of a normal, median.
+    pub fn solved(report: &Report, expected_deg: Option<f64>) -> String {
         let percent = |count: u64| 100.0 * count as f64 / report.pixels.max(1) as f64;
+        let normals = expected_deg.map(|deg| format!("Normals ± {deg:.2}°; "));
         format!(
-            "{:.1} % solved from {} lights, {:.1} % robust, {:.1} % clipped",
+            "{}{:.1} % solved from {} lights, {:.1} % clipped",
+            normals.unwrap_or_default(),
             percent(report.solved),
             report.lights_used.len(),
-            percent(report.robust_pixels),
             percent(report.saturated_pixels)
         )
     }

@@ -21,6 +21,12 @@ pub fn primary(ui: &mut egui::Ui, text: &str, size: egui::Vec2, enabled: bool) -
     ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner
 }
 
+/// A button as large as the primary one, where another one is what the room is about.
+pub fn large(ui: &mut egui::Ui, text: &str, size: egui::Vec2, enabled: bool) -> egui::Response {
+    let button = egui::Button::new(RichText::new(text).size(17.0));
+    ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner
+}
+
 /// What there is to see where there is nothing yet: what is missing, and one button that does something about it. True when
 /// it is clicked.
 pub fn empty(ui: &mut egui::Ui, what: &str, remedy: &str) -> bool {

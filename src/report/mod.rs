@@ -7,6 +7,6 @@ pub mod picture;
 mod solution;
 
 pub use distribution::Distribution;
-pub use of_solve::{Truth, page_of_solve};
+pub use of_solve::{Truth, expected_error, page_of_solve};
 pub use picture::Thumbnail;
 pub use solution::{Figure, SolutionPage, TruthErrors, Verdict};

@@ -24,7 +24,7 @@ pub struct Truth {
 /// The page of a solution as one self-contained HTML file.
 pub fn page_of_solve(shown: &Shown, truth: Option<&Truth>) -> String {
     let report = shown.report;
-    let expected = Distribution::of(strided(&shown.maps.confidence.data).filter(|v| *v > 0.0));
+    let expected = expected_error(shown);
     let angles = truth.map(|truth| angles(&shown.maps.normal, &truth.normal));
     let errors = angles.as_ref().map(|angles| errors(shown, truth, angles));
     SolutionPage {
@@ -39,6 +39,11 @@ pub fn page_of_solve(shown: &Shown, truth: Option<&Truth>) -> String {
         frames: frames(shown),
     }
     .html()
+}
+
+/// How the expected errors of the normals spread, degrees; `None` where nothing is solved.
+pub fn expected_error(shown: &Shown) -> Option<Distribution> {
+    Distribution::of(strided(&shown.maps.confidence.data).filter(|error| *error > 0.0))
 }
 
 fn strided(values: &[f32]) -> impl Iterator<Item = f32> {

@@ -273,6 +273,9 @@ pub fn better(next: &str) -> String {
     format!("What would improve it most: {next}.")
 }
 
+/// What comes after a calibration.
+pub const GO_SCAN: &str = "Scan a swatch";
+
 /// How old it is.
 pub fn age(days: i64) -> String {
     match days {

@@ -14,6 +14,7 @@ pub use work::Memory;
 
 use crate::browse::Browse;
 use crate::desk::{Brake, Desk};
+use crate::rooms::Room;
 use crate::texts::calibrate as texts;
 use crate::theme;
 use crate::worker::{Command, Outbox, Tools};
@@ -138,6 +139,11 @@ impl Calibrate {
         view::instructions(ui, task, state, simulated);
         if task == Task::Done {
             view::verdict(ui, state);
+            let size = egui::vec2(220.0, theme::BIG);
+            if crate::widgets::primary(ui, texts::GO_SCAN, size, true).clicked() {
+                desk.go_to(Room::Scan);
+            }
+            ui.add_space(theme::GAP);
             return;
         }
         let needs_opencv = task.step() == Some(Step::Camera) || !simulated;

@@ -150,7 +150,13 @@ impl Form {
     pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk, done: bool) -> bool {
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
         let text = if done { texts::NEXT } else { texts::SCAN };
-        let clicked = widgets::primary(ui, text, size, can_go(desk, done)).clicked();
+        let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
+        // Without a calibration the room is about getting one.
+        let button = match calibrated {
+            true => widgets::primary(ui, text, size, can_go(desk, done)),
+            false => widgets::large(ui, text, size, can_go(desk, done)),
+        };
+        let clicked = button.clicked();
         let taken = !done && is_taken(&desk.settings.scan.name, desk.place.as_ref());
         let hint = match (desk.is_busy(), taken) {
             (true, _) => texts::BUSY,

@@ -93,6 +93,8 @@ pub enum Told {
         solution: PathBuf,
         /// What it says of itself.
         report: Box<Report>,
+        /// Expected error of a normal, median, degrees; `None` where the maps were there already.
+        expected_deg: Option<f64>,
     },
     /// The folder of a scan to solve.
     Dropped(PathBuf),
@@ -113,7 +115,7 @@ pub(crate) enum Stage {
     /// Frames are there, maps not yet, or not to be had.
     Scanned(Box<Summary>),
     /// Maps are there.
-    Solved { solution: PathBuf, report: Box<Report> },
+    Solved { solution: PathBuf, report: Box<Report>, expected_deg: Option<f64> },
 }
 
 /// What this room keeps.
@@ -261,13 +263,17 @@ impl Scan {
 
     /// What came of the scan, and what to do with it.
     fn result(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let text = match &self.stage {
-            Stage::Scanned(summary) => texts::scanned(summary),
-            Stage::Solved { report, .. } => texts::solved(report),
+        let (good, text) = match &self.stage {
+            Stage::Scanned(summary) => (summary.warnings.is_empty(), texts::scanned(summary)),
+            Stage::Solved { report, expected_deg, .. } => {
+                (is_good(report), texts::solved(report, *expected_deg))
+            }
             _ => return,
         };
+        let sign = if good { widgets::Sign::Good } else { widgets::Sign::Warning };
         let name = desk.settings.scan.name.clone();
         ui.horizontal_wrapped(|ui| {
+            sign.ui(ui);
             ui.label(egui::RichText::new(text).strong());
             if let Stage::Solved { solution, .. } = &self.stage
                 && ui.button(texts::LOOK_CLOSER).clicked()
@@ -319,7 +325,9 @@ impl Scan {
                 self.strip.done();
                 self.stage = Stage::Scanned(summary);
             }
-            Told::Solved { solution, report } => self.stage = Stage::Solved { solution, report },
+            Told::Solved { solution, report, expected_deg } => {
+                self.stage = Stage::Solved { solution, report, expected_deg };
+            }
             Told::Dropped(scan) => {
                 let settings = desk.settings.solve;
                 desk.ask(Command::Scan(Ask::Solve { scan, settings }));
@@ -341,6 +349,13 @@ impl Scan {
         desk.settings.scan.next_free_name(desk.place.as_ref());
         desk.ask(Command::Scan(Ask::LookForUnfinished));
     }
+}
+
+/// Whether a solution can be kept without looking twice: nothing was warned of, and hardly anything clips.
+fn is_good(report: &Report) -> bool {
+    const CLIPPED: f64 = 0.01;
+    let clipped = report.saturated_pixels as f64;
+    report.warnings.is_empty() && clipped <= CLIPPED * report.pixels as f64
 }
 
 /// An old calibration makes maps that nobody should trust blindly.

@@ -8,11 +8,12 @@ use crate::settings::SolveSettings;
 use crate::texts::scan as texts;
 use crate::worker::{Outbox, Tools, Update, instruments::with_instruments};
 use std::path::Path;
+use std::sync::OnceLock;
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{
     About, Begin, Event, Options, Preview, ScanError, Subject, Summary, preview, scan,
 };
-use weavelight::report::page_of_solve;
+use weavelight::report::{expected_error, page_of_solve};
 use weavelight::simulate::Scene;
 use weavelight::solve::{Shown, Solved, run_with_page};
 use weavelight_sim::cloth::Preset;
@@ -113,11 +114,16 @@ fn solve(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) 
     let Some(place) = &tools.place else { return };
     let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let solution = place.solution(scan);
+    // Nobody asks for the page where the maps are there already.
+    let expected = OnceLock::new();
     let solved =
         out.job(&texts::solving(&name), || -> Result<Solved, Box<dyn std::error::Error>> {
             std::fs::create_dir_all(solution.parent().unwrap_or(Path::new(".")))?;
             let options = settings.options(scan, &place.calibration(), &solution);
-            let page = |shown: &Shown| page_of_solve(shown, None);
+            let page = |shown: &Shown| {
+                let _ = expected.set(expected_error(shown).map(|spread| spread.median));
+                page_of_solve(shown, None)
+            };
             Ok(run_with_page(
                 &options,
                 &|state| out.tick(state.share(), state.stage.what()),
@@ -126,7 +132,8 @@ fn solve(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) 
         });
     if let Ok(solved) = solved {
         out.warn(&name, &solved.report.warnings);
-        out.tell(Update::Scan(Told::Solved { solution, report: Box::new(solved.report) }));
+        let (report, expected_deg) = (Box::new(solved.report), expected.into_inner().flatten());
+        out.tell(Update::Scan(Told::Solved { solution, report, expected_deg }));
     }
 }
 
