@@ -32,12 +32,13 @@ pub const THEMES: [&str; 3] = ["As the system", "Light", "Dark"];
 pub const SCALE: &str = "Size";
 
 /// Keys and what they do.
-pub const KEYS: [(&str, &str); 8] = [
+pub const KEYS: [(&str, &str); 9] = [
     ("Space     ", "scan, or take the picture"),
     ("Arrows    ", "choose a scan"),
     ("Enter     ", "look at it"),
     ("Ctrl+E    ", "export its maps"),
     ("Delete    ", "move it to the bin"),
+    ("Ctrl+Z    ", "undo"),
     ("Ctrl+1…5  ", "open a room"),
     ("Esc       ", "end what is going on"),
     ("Ctrl+Q    ", "leave"),
@@ -279,6 +280,8 @@ pub mod scan {
     pub const LEAVE: &str = "Not now";
     /// Opens the Look room.
     pub const LOOK_CLOSER: &str = "Look closer";
+    /// Its key.
+    pub const ENTER: &str = "Enter";
     /// Scans the same again.
     pub const REPEAT: &str = "Scan again";
     /// What becomes of the old one.
@@ -423,6 +426,10 @@ pub mod scans {
     /// What that means.
     pub const DELETE_HINT: &str =
         "Frames and maps go to the system's bin, from where they can be restored";
+    /// Brings back what was deleted.
+    pub const UNDO: &str = "Undo";
+    /// Work.
+    pub const BRINGING_BACK: &str = "Bringing the scan back";
     /// The field.
     pub const EXPORT_TO: &str = "Export the maps to";
     /// The button.
@@ -435,6 +442,11 @@ pub mod scans {
     /// A search without result.
     pub fn nothing_found(search: &str) -> String {
         format!("No scan is called “{search}”")
+    }
+
+    /// What was deleted last.
+    pub fn in_the_bin(name: &str) -> String {
+        format!("“{name}” is in the bin.")
     }
 
     /// Where maps went.

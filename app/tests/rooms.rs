@@ -287,6 +287,14 @@ fn scans_are_searched_solved_exported_and_deleted() {
     window.click("Delete");
     window.idle();
     assert!(!window.rig().join("scans/silk 12").exists());
+    window.click("Undo");
+    window.idle();
+    assert!(window.rig().join("scans/silk 12/session.toml").exists());
+    assert!(window.rig().join("solutions/silk 12/normal.exr").exists());
+    assert!(window.harness.query_by_label("Undo").is_none());
+    window.click("Delete");
+    window.idle();
+    assert!(!window.rig().join("scans/silk 12").exists());
     assert!(!window.rig().join("solutions/silk 12").exists());
     assert!(window.rig().join("scans/wool 7").exists());
     // From the bin they could be restored; here they leave it again.

@@ -1,7 +1,10 @@
 //! A window in a test, with a home of its own and a small simulated rig.
 
+mod names;
+
 use eframe::egui;
 use egui_kittest::{Harness, SnapshotResults, kittest::Queryable};
+pub(crate) use names::check_names;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use weavelight::simulate;
@@ -176,6 +179,7 @@ fn pictures(
         let mut window = Window::with(*size, *theme, &change);
         act(&mut window);
         window.harness.run();
+        check_names(&window.harness);
         results.add(window.harness.try_snapshot(format!("{name}-{variant}")));
     }
 }

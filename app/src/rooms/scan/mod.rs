@@ -20,7 +20,7 @@ use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui;
 pub use form::FormSettings;
 use form::{Form, order};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strip::Strip;
 use view::View;
 use weavelight::device::camera::Settings;
@@ -276,10 +276,9 @@ impl Scan {
             sign.ui(ui);
             ui.label(egui::RichText::new(text).strong());
             if let Stage::Solved { solution, .. } = &self.stage
-                && ui.button(texts::LOOK_CLOSER).clicked()
+                && ui.button(texts::LOOK_CLOSER).on_hover_text(texts::ENTER).clicked()
             {
-                desk.ask(Command::Look(look::Ask::Open(solution.clone())));
-                desk.go_to(Room::Look);
+                look_closer(solution, desk);
             }
             if !desk.is_busy()
                 && ui.button(texts::REPEAT).on_hover_text(texts::REPEAT_HINT).clicked()
@@ -293,10 +292,16 @@ impl Scan {
         });
     }
 
-    /// Space does what the big button does, wherever no text is being written.
+    /// Space does what the big button does, Enter looks closer, wherever no text is being written.
     fn keys(&mut self, ui: &egui::Ui, desk: &mut Desk) {
         let free = !ui.ctx().egui_wants_keyboard_input();
-        let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
+        let pressed = |key| free && ui.input(|input| input.key_pressed(key));
+        let space = pressed(egui::Key::Space);
+        if let Stage::Solved { solution, .. } = &self.stage
+            && pressed(egui::Key::Enter)
+        {
+            look_closer(solution, desk);
+        }
         if space && !self.is_running() && form::can_go(desk, self.is_done(desk)) {
             self.go(desk);
         }
@@ -349,6 +354,11 @@ impl Scan {
         desk.settings.scan.next_free_name(desk.place.as_ref());
         desk.ask(Command::Scan(Ask::LookForUnfinished));
     }
+}
+
+fn look_closer(solution: &Path, desk: &mut Desk) {
+    desk.ask(Command::Look(look::Ask::Open(solution.to_owned())));
+    desk.go_to(Room::Look);
 }
 
 /// Whether a solution can be kept without looking twice: nothing was warned of, and hardly anything clips.

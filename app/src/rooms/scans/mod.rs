@@ -25,6 +25,8 @@ pub enum Ask {
     Thumbnail(PathBuf),
     /// A scan and its solution into the system's bin.
     Delete(Entry),
+    /// Out of the bin again.
+    BringBack(Entry),
     /// A copy of a solution.
     Export {
         /// The solution.
@@ -41,6 +43,10 @@ pub enum Told {
     List(Vec<Entry>),
     /// The picture of a scan.
     Thumbnail(PathBuf, ColorImage),
+    /// A scan and its solution are in the bin.
+    Deleted(Entry),
+    /// And out of it again.
+    BroughtBack(Entry),
     /// A solution was copied here.
     Exported(PathBuf),
 }
@@ -60,6 +66,8 @@ pub struct Scans {
     export_to: String,
     browse: Browse,
     said: Option<String>,
+    /// What was deleted here and can be brought back, the last one last.
+    deleted: Vec<Entry>,
     /// Whether the list is as the folder was when the room was entered.
     fresh: bool,
 }
@@ -103,6 +111,7 @@ impl Scans {
                 ui.add(hint.desired_width(220.0)).on_hover_text(texts::SEARCH);
             });
         });
+        self.offer_undo(ui, desk);
         if self.entries.is_empty() {
             if widgets::empty(ui, texts::NONE, texts::GO_SCAN) {
                 desk.go_to(Room::Scan);
@@ -120,6 +129,22 @@ impl Scans {
                 found.iter().for_each(|entry| self.card(ui, entry, desk));
             });
         });
+    }
+
+    /// What was deleted last can be had again: with the button, or Control and Z.
+    fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some(last) = self.deleted.last().cloned() else { return };
+        let idle = !desk.is_busy();
+        let clicked = ui.horizontal(|ui| {
+            ui.label(texts::in_the_bin(&last.name));
+            let undo = egui::Button::new(texts::UNDO);
+            ui.add_enabled(idle, undo).on_hover_text("Ctrl+Z").clicked()
+        });
+        let free = idle && !ui.ctx().egui_wants_keyboard_input();
+        let key = free && ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z));
+        if clicked.inner || key {
+            desk.ask(Command::Scans(Ask::BringBack(last)));
+        }
     }
 
     fn found(&self) -> Vec<Entry> {
@@ -273,6 +298,11 @@ impl Scans {
             Told::List(entries) => self.entries = entries,
             Told::Thumbnail(folder, picture) => {
                 self.pictures.insert(folder, Picture::Here(picture));
+            }
+            Told::Deleted(entry) => self.deleted.push(entry),
+            Told::BroughtBack(entry) => {
+                self.deleted.retain(|other| other.folder != entry.folder);
+                self.choose(&entry);
             }
             Told::Exported(to) => self.said = Some(texts::exported(&to)),
         }

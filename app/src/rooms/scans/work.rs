@@ -23,7 +23,8 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
                 out.tell(Update::Scans(Told::Thumbnail(folder, picture)));
             }
         }
-        Ask::Delete(entry) => delete(&entry, place, out),
+        Ask::Delete(entry) => delete(entry, place, out),
+        Ask::BringBack(entry) => bring_back(entry, place, out),
         Ask::Export { solution, to } => export(&solution, &to, out),
     }
 }
@@ -62,12 +63,53 @@ fn keep(picture: &ColorImage, file: &Path) {
     let _ = image::RgbImage::from_raw(width, height, rgb).map(|image| image.save(file));
 }
 
-fn delete(entry: &Entry, place: &Place, out: &Outbox) {
-    let folders = std::iter::once(&entry.folder).chain(&entry.solution);
-    if let Err(error) = trash::delete_all(folders) {
-        out.fail(texts::DELETING, &format!("{}: {error}", entry.folder.display()));
+fn delete(entry: Entry, place: &Place, out: &Outbox) {
+    match trash::delete_all(folders(&entry)) {
+        Ok(()) => out.tell(Update::Scans(Told::Deleted(entry))),
+        Err(error) => out.fail(texts::DELETING, &in_words(&entry, &error)),
     }
     out.tell(Update::Scans(Told::List(list(place))));
+}
+
+/// The scan, and its solution where there is one.
+fn folders(entry: &Entry) -> impl Iterator<Item = &PathBuf> {
+    std::iter::once(&entry.folder).chain(&entry.solution)
+}
+
+fn in_words(entry: &Entry, error: &trash::Error) -> String {
+    format!("{}: {error}; look into the system's bin", entry.folder.display())
+}
+
+fn bring_back(entry: Entry, place: &Place, out: &Outbox) {
+    match restore(&entry) {
+        Ok(()) => out.tell(Update::Scans(Told::BroughtBack(entry))),
+        Err(error) => out.fail(texts::BRINGING_BACK, &in_words(&entry, &error)),
+    }
+    out.tell(Update::Scans(Told::List(list(place))));
+}
+
+/// What lay under the entry's names and was deleted last.
+#[cfg(not(target_os = "macos"))]
+fn restore(entry: &Entry) -> Result<(), trash::Error> {
+    let bin = trash::os_limited::list()?;
+    let newest = |folder: &PathBuf| {
+        // The bin knows places without links on the way.
+        let parent = folder.parent()?.canonicalize().ok()?;
+        let place = parent.join(folder.file_name()?);
+        let of_it = bin.iter().filter(|item| item.original_path() == place);
+        of_it.max_by_key(|item| item.time_deleted).cloned()
+    };
+    let items: Vec<trash::TrashItem> = folders(entry).filter_map(newest).collect();
+    match items.is_empty() {
+        true => Err(trash::Error::Unknown { description: "it is not in the bin any more".into() }),
+        false => trash::os_limited::restore_all(items),
+    }
+}
+
+/// There no program may take things out of the bin.
+#[cfg(target_os = "macos")]
+fn restore(_entry: &Entry) -> Result<(), trash::Error> {
+    Err(trash::Error::Unknown { description: "it can be put back in the Finder".into() })
 }
 
 /// Copies a solution; it stands under its name only when whole.
