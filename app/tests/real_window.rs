@@ -115,6 +115,14 @@ impl Desktop {
         std::thread::sleep(Duration::from_millis(300));
     }
 
+    /// Clicks something by its place.
+    fn click(&self, what: &str, x: u32, y: u32) {
+        // It may just be about to appear.
+        std::thread::sleep(Duration::from_secs(1));
+        println!("clicking “{what}”");
+        self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.2", "click", "1"]);
+    }
+
     /// A picture of the screen; more than one colour is in it.
     fn picture(&self, name: &str) -> PathBuf {
         std::thread::sleep(Duration::from_millis(500));
@@ -242,5 +250,49 @@ fn a_killed_window_reopens_the_scan_where_it_stood() {
     exists(&rig.join("solutions/linen 1/report.json"));
     assert!(frame(9).is_ok());
     assert_eq!(frame(3).unwrap().modified().unwrap(), before, "what was there is not taken again");
+    desktop.quit();
+}
+
+/// From nothing to a hand on the light, as somebody does it who has only just installed the program: the simulated rig at a
+/// quarter of full size, calibrated, a swatch scanned, looked at. `--run-ignored all --no-capture` tells how long it takes.
+#[test]
+#[ignore = "two minutes of measuring time"]
+fn the_first_run_takes_five_minutes() {
+    let Some(mut desktop) = Desktop::start() else {
+        println!("not run: Xvfb, xdotool or ImageMagick is missing");
+        return;
+    };
+    let rig = desktop.home().join("Weavelight/simulated rig");
+    let begun = Instant::now();
+    let tell = |what: &str| println!("{:5.1} s: {what}", begun.elapsed().as_secs_f64());
+    desktop.open();
+    tell("the window is there");
+    // Where the buttons are in a window of 1280 x 800 points: see the room's pictures.
+    desktop.click("Try it with a simulated rig", 698, 287);
+    exists(&rig.join("rig.toml"));
+    desktop.click("Calibrate it", 844, 259);
+    desktop.click("Do the rest by itself", 816, 128);
+    exists(&rig.join("calibration/camera.toml"));
+    tell("the camera is calibrated");
+    exists(&rig.join("calibration/lights.toml"));
+    tell("the lights are calibrated");
+    desktop.key("ctrl+3");
+    // The big button wakes up when the check is done.
+    until("the scan has begun", || {
+        desktop.key("space");
+        rig.join("scans/linen 1").exists().then_some(())
+    });
+    tell("the rig is checked, the scan has begun");
+    exists(&rig.join("solutions/linen 1/report.json"));
+    tell("the swatch is scanned and solved");
+    std::thread::sleep(Duration::from_secs(1));
+    desktop.key("Return");
+    std::thread::sleep(Duration::from_secs(1));
+    let before = desktop.picture("first-look");
+    desktop.xdotool(&["mousemove", "500", "400", "mousedown", "1", "mousemove", "300", "500"]);
+    let after = desktop.picture("first-relit");
+    tell("the light is in the hand");
+    assert!(changed_pixels(&before, &after) > 50_000);
+    assert!(begun.elapsed() < Duration::from_secs(300));
     desktop.quit();
 }
