@@ -131,7 +131,7 @@ pub fn lights(
         sheets.push(observed.sheet);
         brightest.push(observed.brightest);
     }
-    let priors: Vec<Prior> = rig.lights.iter().map(|light| prior(&light.place)).collect();
+    let priors = priors(&rig);
     check_poses(&sheets, &options.rig)?;
     check_wiring(&sheets, &priors, &options.rig)?;
     progress(0.85, "fitting the lights");
@@ -175,6 +175,11 @@ fn with_camera(out: &Path) -> Result<Calibration, CalibrateError> {
 fn no_camera(out: &Path) -> CalibrateError {
     let remedy = "run `weavelight calibrate camera` into the same folder first";
     CalibrateError::target(out, "the camera is not calibrated yet", remedy)
+}
+
+/// What the rig file says of the lights.
+pub(super) fn priors(rig: &Rig) -> Vec<Prior> {
+    rig.lights.iter().map(|light| prior(&light.place)).collect()
 }
 
 fn prior(place: &RigLightPlace) -> Prior {

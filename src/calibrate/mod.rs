@@ -22,8 +22,12 @@ pub use check::{CheckOptions, CheckReport, CheckedSheet, check};
 pub use color::{ColorOptions, ColorReport, color};
 pub use error::CalibrateError;
 pub use lights::{LightReport, LightsOptions, LightsReport, SheetReport, lights};
-pub use seen::{BoardsSoFar, SeenBoard, SeenSheet, boards_so_far, find_board, look_at_sheet};
+pub use seen::{
+    BoardsSoFar, SeenBoard, SeenSheet, boards_so_far, find_board, look_at_sheet, sheets_so_far,
+};
 pub use status::{Status, Step, StepState, status};
+
+pub use weavelight_calibration::lights::Foreseen;
 
 use crate::files::{FileError, Input, sha256_of_file};
 use crate::session::Session;

@@ -5,12 +5,14 @@ use super::boards::{self, Corners, shape_of};
 use super::camera::COVERAGE_GRID;
 use super::frames::grey_picture;
 use super::sheet::{Known, cell_side, observe, tilt_and_height};
-use super::{CalibrateError, Progress};
-use crate::instrument::Calibration;
+use super::{CalibrateError, Progress, lights};
+use crate::instrument::{Calibration, Rig};
 use crate::raw::Frame;
 use crate::session::{Board, Session};
 use std::path::Path;
 use weavelight_calibration::board::{LEAST_VIEWS, coverage};
+use weavelight_calibration::description::{Camera, Plane};
+use weavelight_calibration::lights::{Foreseen, Sheet, foresee};
 
 /// A chessboard that was found in a picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +58,7 @@ pub fn boards_so_far(seen: &[SeenBoard], board: &Board, size_px: [usize; 2]) -> 
 }
 
 /// A white sheet as the light fit will see it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct SeenSheet {
     /// Middles of the cells that are measured, pixels.
     pub cells_px: Vec<[f64; 2]>,
@@ -70,6 +72,7 @@ pub struct SeenSheet {
     pub brightest: f64,
     /// Sentences.
     pub warnings: Vec<String>,
+    sheet: Sheet,
 }
 
 /// Looks at a white capture session with what of `calibration` is there: its camera at least.
@@ -103,5 +106,21 @@ pub fn look_at_sheet(
         height_mm,
         brightest: observed.brightest,
         warnings: observed.warnings,
+        sheet: observed.sheet,
     })
+}
+
+/// How well the lights' places would be known if they were calibrated with the sheets so far, and with one more that lies on
+/// `next`; before the first sheet, how well the ruler knows them. `camera`: the one that the sheets were looked at with.
+///
+/// # Errors
+/// Where the sheets so far cannot be fitted: what `calibrate lights` would say.
+pub fn sheets_so_far(
+    seen: &[SeenSheet],
+    rig: &Rig,
+    camera: &Camera,
+    next: &Plane,
+) -> Result<Foreseen, CalibrateError> {
+    let sheets: Vec<Sheet> = seen.iter().map(|seen| seen.sheet.clone()).collect();
+    Ok(foresee(camera, &sheets, &lights::priors(rig), next)?)
 }

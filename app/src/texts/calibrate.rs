@@ -226,6 +226,56 @@ pub fn reprojection(rms_px: Option<f64>) -> String {
     }
 }
 
+/// How many sheets are photographed.
+pub fn sheets(taken: usize, of: usize) -> String {
+    format!("{taken} of {of} sheets")
+}
+
+/// A pose of the sheet in a word or two.
+fn pose(pose: &Pose) -> &'static str {
+    match pose {
+        Pose::Flat => "flat",
+        Pose::Raised => "raised",
+        Pose::Tilt(0) => "facing the upper right",
+        Pose::Tilt(1) => "facing the upper left",
+        Pose::Tilt(2) => "facing the lower left",
+        Pose::Tilt(_) => "facing the lower right",
+        Pose::Check => "for the check",
+    }
+}
+
+/// The sketch of them, to those who do not see it.
+pub fn sheets_there(sheets: &[Pose]) -> String {
+    match sheets {
+        [] => "No sheet yet".to_owned(),
+        sheets => {
+            format!("Sheets so far: {}", sheets.iter().map(pose).collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
+/// A length of which two digits are worth reading.
+fn about_mm(mm: f64) -> String {
+    match mm {
+        mm if mm < 1.0 => format!("{mm:.2} mm"),
+        mm if mm < 10.0 => format!("{mm:.1} mm"),
+        mm => format!("{mm:.0} mm"),
+    }
+}
+
+/// How well the lights' places would be known if the work ended here.
+pub fn foreseen_now(sheets: usize, mm: f64) -> String {
+    match sheets {
+        0 => format!("The ruler knows where the lights are within {}", about_mm(mm)),
+        _ => format!("Finished now, the lights' places would be known within {}", about_mm(mm)),
+    }
+}
+
+/// And with one sheet more.
+pub fn foreseen_then(mm: f64) -> String {
+    format!("This sheet should bring that to {}; below 1 mm is good", about_mm(mm))
+}
+
 /// What came of the camera.
 pub fn camera_figures(boards: usize, rms_px: f64, height_mm: f64) -> String {
     format!("{boards} boards, reprojection error {rms_px:.3} px, {height_mm:.1} mm over the table")

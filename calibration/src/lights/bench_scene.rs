@@ -1,7 +1,7 @@
 //! A simulated bench for tests: its forward model is written out afresh here, with effects that the fit does not know.
 
 use super::{Cell, Emitter, Place, PoseSigma, Prior, Sample, Sheet};
-use crate::description::Plane;
+use crate::description::{Camera, Plane};
 use nalgebra::{Point3, Rotation3, UnitVector3, Vector3};
 
 pub(crate) struct Bench {
@@ -172,6 +172,20 @@ pub(crate) fn irradiance(led: &Led, point: &Point3<f64>, normal: &Vector3<f64>) 
 const FRAME: [f64; 2] = [4928.0, 3264.0];
 const FOCAL_PX: f64 = 7322.0;
 const HEIGHT_MM: f64 = 610.0;
+
+/// The camera that sees the cells.
+pub(crate) fn camera() -> Camera {
+    Camera {
+        width_px: FRAME[0] as usize,
+        height_px: FRAME[1] as usize,
+        fx: FOCAL_PX,
+        fy: FOCAL_PX,
+        cx: (FRAME[0] - 1.0) / 2.0,
+        cy: (FRAME[1] - 1.0) / 2.0,
+        distortion: [0.0; 5],
+        camera_from_rig: Camera::looking_down(HEIGHT_MM),
+    }
+}
 
 fn cell_at(place: [usize; 2], grid: [usize; 2], plane: &Plane) -> Cell {
     let pixel: [f64; 2] =

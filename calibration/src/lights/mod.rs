@@ -3,6 +3,7 @@
 mod basis;
 mod emission;
 mod fit;
+mod foresee;
 mod gain;
 mod joint;
 mod observation;
@@ -13,6 +14,7 @@ mod wiring;
 
 pub use emission::{Emitter, Place};
 pub use fit::{Error, Fit, FittedLight, Settings, fit};
+pub use foresee::{Foreseen, foresee};
 pub use gain::{Gains, gains, has_several_poses};
 pub use joint::Prior;
 #[cfg(test)]

@@ -31,7 +31,18 @@ impl Plan<'_> {
     ///
     /// The information of a sheet does not depend on what it shows: the fit's own normal equations tell in advance.
     pub fn expected_sigma_mm(&self, planes: &[Plane]) -> Option<Vec<f64>> {
-        let sheets: Vec<Sheet> = planes.iter().map(|plane| self.sheet(plane)).collect();
+        let exact: Vec<(Plane, PoseSigma)> =
+            planes.iter().map(|plane| (plane.clone(), PoseSigma::default())).collect();
+        self.expected_sigma_with_poses_mm(&exact)
+    }
+
+    /// The same for planes that are known to a sigma each.
+    pub(super) fn expected_sigma_with_poses_mm(
+        &self,
+        planes: &[(Plane, PoseSigma)],
+    ) -> Option<Vec<f64>> {
+        let sheets: Vec<Sheet> =
+            planes.iter().map(|(plane, sigma)| self.sheet(plane, *sigma)).collect();
         let priors: Vec<Prior> =
             self.lights.iter().zip(self.ruler_sigma_mm).map(|(l, s)| prior(l, *s)).collect();
         let mut problem = Problem::new(&sheets, priors);
@@ -57,7 +68,7 @@ impl Plan<'_> {
         Some(self.lights.iter().enumerate().map(sigma).collect())
     }
 
-    fn sheet(&self, plane: &Plane) -> Sheet {
+    fn sheet(&self, plane: &Plane, pose_sigma: PoseSigma) -> Sheet {
         let projector = Projector::new(self.camera);
         let size = [self.camera.width_px, self.camera.height_px];
         let cell = |k: usize| {
@@ -73,13 +84,20 @@ impl Plan<'_> {
         Sheet {
             name: String::new(),
             plane: plane.clone(),
-            pose_sigma: PoseSigma::default(),
+            pose_sigma,
             reflectance: 1.0,
             grid: GRID,
             samples: vec![sample; cells.len() * self.lights.len()],
             cells,
         }
     }
+}
+
+/// Over the near lights, those that have a number.
+pub(super) fn rms(sigmas_mm: &[f64]) -> Option<f64> {
+    let near: Vec<f64> = sigmas_mm.iter().copied().filter(|sigma| sigma.is_finite()).collect();
+    let square = near.iter().map(|sigma| sigma * sigma).sum::<f64>();
+    (!near.is_empty()).then(|| (square / near.len() as f64).sqrt())
 }
 
 fn prior(light: &Light, ruler_sigma_mm: f64) -> Prior {
@@ -102,36 +120,23 @@ fn prior(light: &Light, ruler_sigma_mm: f64) -> Prior {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::bench_scene::{Bench, poses};
+    use crate::lights::bench_scene::{Bench, camera, poses};
 
     #[test]
     fn tilts_bring_more_than_heights_and_all_together_most() {
         let bench = Bench::default();
         let lights: Vec<Light> =
             bench.priors(&bench.leds()).iter().map(|prior| prior.emitter.light([1.0; 3])).collect();
-        let camera = Camera {
-            width_px: 1232,
-            height_px: 816,
-            fx: 1830.0,
-            fy: 1830.0,
-            cx: 615.5,
-            cy: 407.5,
-            distortion: [0.0; 5],
-            camera_from_rig: Camera::looking_down(610.0),
-        };
         let ruler_sigma_mm = [10.0; 10];
         let plan = Plan {
-            camera: &camera,
+            camera: &camera(),
             lights: &lights,
             ruler_sigma_mm: &ruler_sigma_mm,
             cell_noise: 5e-4,
             slow_error_rms: 1e-3,
         };
         let all = poses();
-        let rms = |planes: &[Plane]| {
-            let sigma = plan.expected_sigma_mm(planes).unwrap();
-            (sigma.iter().map(|s| s * s).sum::<f64>() / sigma.len() as f64).sqrt()
-        };
+        let rms = |planes: &[Plane]| rms(&plan.expected_sigma_mm(planes).unwrap()).unwrap();
         let flat = rms(&all[..1]);
         let raised = rms(&all[..2]);
         let tilted = rms(&[all[0].clone(), all[2].clone()]);

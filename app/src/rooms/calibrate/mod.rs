@@ -1,7 +1,9 @@
 //! The Calibrate room, a wizard: one thing to do at a time, what the camera sees with what was found drawn over it, how good it
 //! is so far, and what comes next.
 
+mod coverage;
 mod figures;
+mod foresee;
 mod history;
 mod picture;
 mod task;
@@ -91,13 +93,11 @@ impl Calibrate {
             egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
         });
         let task = self.state.as_ref().map(|state| state.next());
-        if task.and_then(Task::step) == Some(Step::Camera) {
-            let coverage = egui::Panel::bottom("coverage").exact_size(view::COVERAGE_HEIGHT);
-            coverage.show(ui, |ui| {
-                if let Some(state) = &self.state {
-                    view::coverage(ui, state);
-                }
-            });
+        if let (Some(task), Some(state)) = (task, &self.state)
+            && let Some(draw) = coverage::of(task)
+        {
+            let panel = egui::Panel::bottom("coverage").exact_size(coverage::HEIGHT);
+            panel.show(ui, |ui| draw(ui, state));
         }
         egui::CentralPanel::default().show(ui, |ui| {
             if let Some(task) = task {

@@ -1,7 +1,7 @@
 //! What is to be done next, as a function of what is there.
 
 use serde::{Deserialize, Serialize};
-use weavelight::calibrate::{BoardsSoFar, Status, StepState};
+use weavelight::calibrate::{BoardsSoFar, Foreseen, Status, StepState};
 
 /// The wizard's steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +46,17 @@ impl Pose {
             Pose::Raised => "white-raised".to_owned(),
             Pose::Tilt(k) => format!("white-tilt-{}", k + 1),
             Pose::Check => "check-tilt".to_owned(),
+        }
+    }
+
+    /// How it is to lie: height of its middle over the table (millimetres), tilt, and where it then faces (degrees; 0 is the
+    /// picture's right, 90 its top).
+    pub fn lies(self) -> [f64; 3] {
+        match self {
+            Pose::Flat => [0.0; 3],
+            Pose::Raised => [100.0, 0.0, 0.0],
+            Pose::Tilt(k) => [60.0, 20.0, 90.0 * k as f64 + 45.0],
+            Pose::Check => [60.0, 18.0, 90.0],
         }
     }
 }
@@ -100,6 +111,8 @@ pub struct State {
     pub chart: bool,
     /// The sheets that are photographed.
     pub sheets: Vec<Pose>,
+    /// What those of the lights tell so far, and what the next one would.
+    pub foreseen: Option<Foreseen>,
     /// Which of camera, colour and lights were made from what lies in `targets` now.
     pub fresh: [bool; 3],
     /// Whether the check passed; `None` before it.
@@ -226,6 +239,7 @@ mod tests {
             so_far: BoardsSoFar::default(),
             chart: false,
             sheets: Vec::new(),
+            foreseen: None,
             fresh: [false; 3],
             passed: None,
             age_days: None,

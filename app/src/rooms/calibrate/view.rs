@@ -1,7 +1,7 @@
 //! How the wizard looks.
 
 use super::picture::{Picture, paint_earlier};
-use super::task::{BOARDS, State, Step, TargetSettings, Task};
+use super::task::{State, Step, TargetSettings, Task};
 use crate::browse::Browse;
 use crate::place::Place;
 use crate::texts::calibrate as texts;
@@ -10,9 +10,6 @@ use crate::widgets::Sign;
 use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
 use weavelight::calibrate::StepState;
 use weavelight::instrument::CameraKind;
-
-/// Height of the panel that shows what the boards cover.
-pub(super) const COVERAGE_HEIGHT: f32 = 108.0;
 
 /// The picture that was taken last.
 #[derive(Default)]
@@ -139,7 +136,7 @@ fn mark(ui: &mut egui::Ui, state: &State, step: Step) {
 }
 
 /// A button among others of the same text has a name of its own.
-fn name(ui: &egui::Ui, response: &egui::Response, name: &str) {
+pub(super) fn name(ui: &egui::Ui, response: &egui::Response, name: &str) {
     let (enabled, name) = (ui.is_enabled(), name.to_owned());
     response
         .widget_info(move || egui::WidgetInfo::labeled(egui::Role::Button, enabled, name.clone()));
@@ -237,37 +234,6 @@ fn shape(ui: &mut egui::Ui, text: &str, [columns, rows]: &mut [usize; 2], square
 fn field(ui: &mut egui::Ui, text: &str, value: egui::DragValue<'_>) {
     let label = ui.label(text);
     ui.add(value).labelled_by(label.id);
-}
-
-/// What the corners so far cover, and how well they fit.
-pub(super) fn coverage(ui: &mut egui::Ui, state: &State) {
-    let [columns, rows] = state.so_far.coverage_grid;
-    let [taken, found] = state.boards;
-    ui.horizontal_centered(|ui| {
-        let size = vec2(120.0, 80.0);
-        let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
-        let covered = state.so_far.coverage.iter().filter(|count| **count > 0).count();
-        let text = texts::covered(covered, columns * rows);
-        name(ui, &response, &text);
-        let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
-        for (k, count) in state.so_far.coverage.iter().enumerate() {
-            let cell = vec2(rect.width() / columns as f32, rect.height() / rows as f32);
-            let corner = rect.min + vec2((k % columns) as f32, (k / columns) as f32) * cell;
-            let strength = (*count as f32 / 12.0).min(1.0);
-            let color = meaning::ACTIVE.gamma_multiply(0.15 + 0.85 * strength);
-            if *count > 0 {
-                let field = egui::Rect::from_min_size(corner, cell).shrink(0.75);
-                painter.rect_filled(field, 1.0, color);
-            }
-        }
-        ui.vertical(|ui| {
-            ui.add_space(theme::GAP);
-            ui.label(RichText::new(texts::boards(found, BOARDS, taken - found)).strong());
-            ui.label(text);
-            ui.label(RichText::new(texts::reprojection(state.so_far.rms_px)).weak());
-        });
-    });
 }
 
 /// How old it is, and from when on that counts.

@@ -2,7 +2,7 @@
 
 use super::picture::{Marks, Picture};
 use super::task::{Pose, State, Step, TargetSettings, Task};
-use super::{Ask, Report, Told, history};
+use super::{Ask, Report, Told, foresee::Sheets, history};
 use crate::place::Place;
 use crate::texts::calibrate as texts;
 use crate::worker::{Outbox, Tools, Update, instruments::with_instruments};
@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use weavelight::calibrate::{
     self, CameraOptions, CheckOptions, ColorOptions, LightsOptions, SeenBoard, boards_so_far,
-    find_board, look_at_sheet, status,
+    find_board, status,
 };
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{
@@ -29,6 +29,7 @@ type AnyError = Box<dyn std::error::Error + Send + Sync>;
 pub struct Memory {
     /// By the frame's hash.
     seen: HashMap<String, Option<SeenBoard>>,
+    sheets: Sheets,
     /// Whether the sheet that the fit has not seen passed, and under which `lights.toml`.
     passed: Option<(String, bool)>,
 }
@@ -87,20 +88,15 @@ impl Drop for Table<'_> {
 
 /// What the program lays on the simulated table for a task.
 fn lying(task: Task, pictures: usize) -> Lying {
-    let white = |height_mm: f64, tilt_deg: f64, towards_deg: f64| Lying::White {
-        height_mm,
-        tilt_deg,
-        towards_deg,
-    };
     match task {
         Task::Table => Lying::Board { pose: 0 },
         // Sixteen poses; the first is the table's.
         Task::Board => Lying::Board { pose: 1 + pictures.saturating_sub(1) % 15 },
         Task::Chart => Lying::Grey,
-        Task::Sheet(Pose::Flat) => white(0.0, 0.0, 0.0),
-        Task::Sheet(Pose::Raised) => white(100.0, 0.0, 0.0),
-        Task::Sheet(Pose::Tilt(k)) => white(60.0, 20.0, 90.0 * k as f64 + 45.0),
-        Task::Sheet(Pose::Check) => white(60.0, 18.0, 90.0),
+        Task::Sheet(pose) => {
+            let [height_mm, tilt_deg, towards_deg] = pose.lies();
+            Lying::White { height_mm, tilt_deg, towards_deg }
+        }
         Task::Fit(_) | Task::Done => Lying::Swatch,
     }
 }
@@ -164,7 +160,8 @@ fn take(task: Task, settings: &TargetSettings, tools: &mut Tools, out: &Outbox) 
         with_instruments(tools, |place, with| photograph(task, settings, (place, with), out))
     });
     let Ok(true) = taken else { return false };
-    let looked = out.job(texts::LOOKING, || examine(task, &place, out));
+    let memory = &mut tools.calibrate;
+    let looked = out.job(texts::LOOKING, || examine(task, &place, &mut memory.sheets, out));
     let Ok(good) = looked else { return false };
     // The fit follows its last picture.
     let next = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
@@ -269,7 +266,7 @@ fn chart_picture(frame: &Frame, patches: &[weavelight::session::Patch], note: St
 }
 
 /// Looks at what was photographed and shows it; whether it serves.
-fn examine(task: Task, place: &Place, out: &Outbox) -> Result<bool, AnyError> {
+fn examine(task: Task, place: &Place, sheets: &mut Sheets, out: &Outbox) -> Result<bool, AnyError> {
     let folder = place.targets().join(session_name(task));
     let session = Session::load(&folder)?;
     let tell = |picture: Picture| {
@@ -289,12 +286,12 @@ fn examine(task: Task, place: &Place, out: &Outbox) -> Result<bool, AnyError> {
         Task::Sheet(_) => {
             let Some(entry) = lit else { return Ok(false) };
             let frame = read(&session, entry)?;
-            let lights = place.rig.lights.len();
             let progress = |share: f64, what: &str| out.tick(share, what);
-            match look_at_sheet(&folder, &place.calibration(), lights, &progress) {
+            match sheets.look(place, &folder, &progress) {
                 Ok(seen) => {
-                    let note = texts::sheet_seen(&seen);
-                    let marks = Marks::Cells { px: seen.cells_px, side_px: seen.cell_px };
+                    let note = [vec![texts::sheet_seen(seen)], seen.warnings.clone()].concat();
+                    let note = note.join(" ");
+                    let marks = Marks::Cells { px: seen.cells_px.clone(), side_px: seen.cell_px };
                     Ok(tell(Picture::new(&frame, marks, note, true)))
                 }
                 Err(error) => {
@@ -387,7 +384,7 @@ fn sheets(place: &Place) -> Vec<PathBuf> {
 }
 
 /// Every light, the ambient light, and the first light again.
-fn is_complete(folder: &Path, rig: &Rig) -> bool {
+pub(super) fn is_complete(folder: &Path, rig: &Rig) -> bool {
     Session::load(folder).is_ok_and(|session| session.frames.len() >= rig.lights.len() + 2)
 }
 
@@ -433,7 +430,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
     sheets.extend(Some(Pose::Check).filter(|pose| whole(*pose)));
     let now = lights_hash(place);
     let passed = memory.passed.as_ref().filter(|(hash, _)| Some(hash) == now.as_ref());
-    Ok(State {
+    let mut state = State {
         begun: place.targets().exists(),
         boards: [seen.len(), found.len()],
         table,
@@ -445,8 +442,13 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
         age_days: calibration.as_ref().and_then(crate::place::age_days),
         history: history::entries(place),
         sheets,
+        foreseen: None,
         status,
-    })
+    };
+    // No tick: what is there is told after work that was stopped, too.
+    let progress = |share: f64, what: &str| out.progress(share, what, None);
+    state.foreseen = memory.sheets.foresee(place, state.next(), &progress);
+    Ok(state)
 }
 
 /// Every picture of the board with what was found in it; each is looked at once.
