@@ -3,6 +3,7 @@
 //! `calibrate camera`, `calibrate color` and `calibrate lights` each add one file to a calibration folder. A file is replaced
 //! only once its successor is whole: whatever fails, the old calibration stands.
 
+mod action;
 mod boards;
 mod camera;
 mod check;
@@ -17,6 +18,7 @@ mod seen;
 mod sheet;
 mod status;
 
+pub use action::{Action, SheetPose};
 pub use camera::{BoardReport, CameraOptions, CameraReport, camera};
 pub use check::{CheckOptions, CheckReport, CheckedSheet, check};
 pub use color::{ColorOptions, ColorReport, color};

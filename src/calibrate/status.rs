@@ -2,6 +2,7 @@
 //! it most. A function of what lies in the folder: the window and `weavelight calibrate status` show the same.
 
 use super::CalibrateError;
+use super::action::{Action, SheetPose};
 use super::sheet::exposure_advice;
 use crate::files::Provenance;
 use crate::instrument::{CalibratedLight, Calibration};
@@ -19,6 +20,9 @@ pub struct Status {
     /// Expected RMS error of the lights' positions, millimetres, if the lights are calibrated.
     pub position_sigma_mm: Option<f64>,
     /// What to do next.
+    #[serde(skip)]
+    pub action: Action,
+    /// The same in the command line's words.
     pub next: String,
     /// What to change of the exposures of the sheets that were used, if anything.
     pub exposure: Vec<String>,
@@ -74,21 +78,19 @@ pub fn status(folder: &Path) -> Result<Status, CalibrateError> {
     if calibration.lights_of_another_camera()? {
         status.steps[2].state = StepState::Improvable;
         status.steps[2].quality += "; measured with another camera.toml";
-        status.next = STALE_LIGHTS.to_owned();
+        status.action = Action::LightsAgain;
+        status.next = status.action.to_string();
         status.next_sigma_mm = None;
     }
     Ok(status)
 }
 
-/// The camera was calibrated anew after the lights.
-const STALE_LIGHTS: &str = "run `calibrate lights` again on the same white sheets: the camera was calibrated after them, and the lights still stand in its old frame";
-
 fn describe(calibration: Option<&Calibration>) -> Status {
     let steps = vec![camera_step(calibration), color_step(calibration), lights_step(calibration)];
     let position_sigma_mm = calibration.and_then(|calibration| rms_sigma(&calibration.lights));
-    let (next, next_sigma_mm) = next_action(calibration, &steps);
+    let (action, next_sigma_mm) = next_action(calibration, &steps);
     let exposure = calibration.and_then(exposures).unwrap_or_default();
-    Status { steps, position_sigma_mm, next, exposure, next_sigma_mm }
+    Status { steps, position_sigma_mm, action, next: action.to_string(), exposure, next_sigma_mm }
 }
 
 /// The advice on each sheet's exposure.
@@ -181,56 +183,35 @@ fn rms_sigma(lights: &[CalibratedLight]) -> Option<f64> {
 }
 
 /// The single action that would improve the calibration most.
-fn next_action(calibration: Option<&Calibration>, steps: &[Step]) -> (String, Option<f64>) {
+fn next_action(calibration: Option<&Calibration>, steps: &[Step]) -> (Action, Option<f64>) {
     let [camera, color, lights] = [0, 1, 2].map(|k| steps[k].state);
-    let say = |text: &str| (text.to_owned(), None);
-    match (camera, color, lights) {
-        (StepState::Missing, ..) => say(
-            "photograph the chessboard 12 to 16 times: once flat in the middle of the table, then tilted by 20 to 40 degrees in all directions and out to the corners; then `calibrate camera`",
-        ),
-        (StepState::Improvable, ..) => say(
-            "photograph the chessboard again, sharp and whole, tilted by 20 to 40 degrees and out to the corners; then `calibrate camera`",
-        ),
-        (_, StepState::Missing, _) => say(
-            "photograph the grey or colour chart under every light, one light at several exposures, and once in the dark; then `calibrate color`",
-        ),
-        (_, _, StepState::Missing) => say(
-            "photograph a white sheet flat on the table under every light, the brightest at 50 to 90 % of full scale; then `calibrate lights`",
-        ),
-        (_, _, StepState::Improvable) => next_sheet(calibration),
-        (_, StepState::Improvable, _) => {
-            say("photograph a colour chart whose patches state lab_d50; then `calibrate color`")
-        }
-        _ => say(
-            "nothing: verify with `calibrate check` on a tilted sheet that the fit has not seen",
-        ),
-    }
+    let action = match (camera, color, lights) {
+        (StepState::Missing, ..) => Action::Boards,
+        (StepState::Improvable, ..) => Action::BetterBoards,
+        (_, StepState::Missing, _) => Action::Chart,
+        (_, _, StepState::Missing) => Action::FlatSheet,
+        (_, _, StepState::Improvable) => return next_sheet(calibration),
+        (_, StepState::Improvable, _) => Action::ColorChart,
+        _ => Action::Check,
+    };
+    (action, None)
 }
 
 /// Tries every likely pose of the sheet and names the one after which the positions would be known best.
-fn next_sheet(calibration: Option<&Calibration>) -> (String, Option<f64>) {
-    let usual = "photograph the white sheet also raised by 100 mm and tilted by 20 degrees in four directions";
+fn next_sheet(calibration: Option<&Calibration>) -> (Action, Option<f64>) {
     let best = calibration.and_then(|calibration| {
         let camera = calibration.camera.as_ref()?;
         let provenance = calibration.provenance.lights.as_ref()?;
         best_pose(calibration, camera, provenance)
     });
-    match best {
-        Some((action, sigma)) => (
-            format!(
-                "photograph the white sheet {action}, and give it to `calibrate lights` with the others"
-            ),
-            Some(sigma),
-        ),
-        None => (usual.to_owned(), None),
-    }
+    best.map_or((Action::MoreSheets, None), |(pose, sigma)| (Action::Sheet(pose), Some(sigma)))
 }
 
 fn best_pose(
     calibration: &Calibration,
     camera: &Camera,
     provenance: &Provenance,
-) -> Option<(String, f64)> {
+) -> Option<(SheetPose, f64)> {
     let quality = &provenance.quality;
     let numbers = |value: &toml::Value| -> Option<Vec<f64>> {
         value.as_array()?.iter().map(toml::Value::as_float).collect()
@@ -258,9 +239,8 @@ fn best_pose(
         let near: Vec<f64> = sigma.into_iter().filter(|s| s.is_finite()).collect();
         Some((near.iter().map(|s| s * s).sum::<f64>() / near.len() as f64).sqrt())
     };
-    let scored = candidates(&lights)
-        .into_iter()
-        .filter_map(|(action, plane)| Some((action, after(&plane)?)));
+    let scored =
+        candidates(&lights).into_iter().filter_map(|(pose, plane)| Some((pose, after(&plane)?)));
     scored.filter(|(_, sigma)| sigma.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -274,12 +254,12 @@ fn plane(row: &[f64]) -> Option<Plane> {
 const TILT_DEG: f64 = 20.0;
 const RAISED_MM: f64 = 100.0;
 
-fn candidates(lights: &[Light]) -> Vec<(String, Plane)> {
+fn candidates(lights: &[Light]) -> Vec<(SheetPose, Plane)> {
     let level =
         |height: f64| Plane { point_mm: Point3::new(0.0, 0.0, height), normal: Vector3::z_axis() };
     let mut all = vec![
-        ("flat on the table".to_owned(), level(0.0)),
-        (format!("raised by about {RAISED_MM:.0} mm"), level(RAISED_MM)),
+        (SheetPose::Flat, level(0.0)),
+        (SheetPose::Raised { mm: RAISED_MM }, level(RAISED_MM)),
     ];
     for (i, light) in lights.iter().enumerate() {
         let towards = match light {
@@ -292,10 +272,7 @@ fn candidates(lights: &[Light]) -> Vec<(String, Plane)> {
         let (sin, cos) = TILT_DEG.to_radians().sin_cos();
         let normal = UnitVector3::new_normalize(level * sin + Vector3::z() * cos);
         let point_mm = Point3::new(0.0, 0.0, RAISED_MM / 2.0);
-        all.push((
-            format!("tilted towards light {i} by about {TILT_DEG:.0} degrees"),
-            Plane { point_mm, normal },
-        ));
+        all.push((SheetPose::Tilted { light: i, deg: TILT_DEG }, Plane { point_mm, normal }));
     }
     all
 }

@@ -1,7 +1,7 @@
 //! The Calibrate room.
 
 use crate::rooms::calibrate::{BOARDS, Pose, State, Step, Task};
-use weavelight::calibrate::SeenSheet;
+use weavelight::calibrate::{Action, SeenSheet};
 
 /// The button that takes the pictures of a task.
 pub const TAKE: &str = "Take the picture (Space)";
@@ -25,7 +25,14 @@ pub const ANEW_HINT: &str =
 /// The button that takes a step's pictures again.
 pub const AGAIN: &str = "Again";
 /// What that does.
-pub const AGAIN_HINT: &str = "Take the pictures of this step again";
+pub const AGAIN_HINT: &str =
+    "Take the pictures of this step again; those there are go into the folder “history” of the rig";
+/// The button that begins a check.
+pub const CHECK: &str = "Check";
+/// What that does.
+pub const CHECK_HINT: &str = "Photograph a tilted sheet that the calibration has not seen";
+/// The button that leaves the check for another day.
+pub const NOT_NOW: &str = "Not now";
 /// Name of the picture.
 pub const LAST_PICTURE: &str = "What the camera saw";
 /// Before the first picture.
@@ -34,7 +41,7 @@ pub const NOTHING_YET: &str = "The picture appears here, with what is found in i
 pub const SIMULATED: &str =
     "On the simulated rig nobody has hands: the program lays the target there by itself.";
 /// A build without OpenCV.
-pub const NO_CHESSBOARDS: &str = "This build cannot see chessboards. Build the window with `cargo build --release -p weavelight-app --features opencv` (on Debian: sudo apt install libopencv-dev clang), or calibrate the camera with `weavelight calibrate camera` from a build that has it.";
+pub const NO_CHESSBOARDS: &str = "This window was built without OpenCV and cannot see chessboards, which the camera is calibrated with. Install a Weavelight that was built with it, or build it so (the README says how), and open this rig again. Scans with a calibration that is there already work as before.";
 /// The board's shape.
 pub const BOARD: &str = "Inner corners";
 /// The strip's shape.
@@ -48,8 +55,7 @@ pub const CHART: &str = "Chart file";
 /// What it holds.
 pub const CHART_HINT: &str = "A TOML file with schema = 1 and [[target.patches]]: where each patch lies in the picture, and its colour";
 /// Where it is missing.
-pub const NO_CHART: &str =
-    "the chart is not described; name its file, with [[target.patches]] as in a session.toml";
+pub const NO_CHART: &str = "the chart is not described: name its file above the button; it lists every patch as [[target.patches]], as a session.toml does";
 /// The sheet's reflectance.
 pub const REFLECTANCE: &str = "Reflectance";
 /// The raised sheet's height.
@@ -318,9 +324,43 @@ pub fn sigma(now_mm: f64, then_mm: Option<f64>) -> String {
     format!("The lights' places are known within {now_mm:.2} mm{then}.")
 }
 
-/// What would make it better.
-pub fn better(next: &str) -> String {
-    format!("What would improve it most: {next}.")
+/// What would make it better; `begun`: its pictures are here, so that single steps can be taken again;
+/// `checked`: a sheet that it has not seen was taken, too.
+pub fn better(action: &Action, begun: bool, checked: bool) -> String {
+    let again = |of: Step| match begun {
+        true => format!("Press “{AGAIN}” beside {}", step(of)),
+        false => format!("Press “{ANEW}”"),
+    };
+    match action {
+        Action::Boards | Action::BetterBoards => format!(
+            "What would improve it most: more pictures of the chessboard, sharp and whole, tilted by 20 to 40 degrees and out to the corners. {}.",
+            again(Step::Camera)
+        ),
+        Action::Chart => {
+            format!("What would improve it most: pictures of the chart. {}.", again(Step::Color))
+        }
+        Action::ColorChart => format!(
+            "What would improve it most: a colour chart whose file states the colour of every patch (lab_d50). {}.",
+            again(Step::Color)
+        ),
+        Action::FlatSheet | Action::MoreSheets => format!(
+            "What would improve it most: the white sheet flat, raised and tilted. {}.",
+            again(Step::Lights)
+        ),
+        Action::Sheet(pose) => format!(
+            "What would improve it most: a white sheet {pose}. {}, and lay one of the sheets like that.",
+            again(Step::Lights)
+        ),
+        Action::LightsAgain => format!(
+            "The camera was calibrated after the lights, whose places still stand in its old frame. {}.",
+            again(Step::Lights)
+        ),
+        Action::Check => format!(
+            "Nothing is left to improve. Press “{}” beside {} from time to time: a sheet that the calibration has not seen tells whether it still holds.",
+            if checked { AGAIN } else { CHECK },
+            step(Step::Check)
+        ),
+    }
 }
 
 /// What comes after a calibration.

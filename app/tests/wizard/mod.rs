@@ -78,7 +78,7 @@ fn without_chessboards_the_wizard_says_what_to_build() {
     assert!(window.harness.query_by_label("Take the picture (Space)").is_none());
     let said = window.harness.query_all_by_role(egui::accesskit::Role::Label);
     let texts: Vec<String> = said.filter_map(|node| node.accesskit_node().value()).collect();
-    assert!(texts.iter().any(|text| text.contains("--features opencv")), "{texts:?}");
+    assert!(texts.iter().any(|text| text.contains("built without OpenCV")), "{texts:?}");
 }
 
 #[cfg(feature = "opencv")]

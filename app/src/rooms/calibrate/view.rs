@@ -93,6 +93,9 @@ pub(super) fn step(
                         let button = ui.small_button(texts::AGAIN).on_hover_text(texts::AGAIN_HINT);
                         name(ui, &button, &texts::again(step));
                         again = button.clicked();
+                    } else if step == Step::Check && state.next() == Task::Done {
+                        let button = ui.small_button(texts::CHECK);
+                        again = button.on_hover_text(texts::CHECK_HINT).clicked();
                     }
                 });
             });
@@ -170,7 +173,10 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
     for advice in &state.status.exposure {
         line(Sign::Warning, advice);
     }
-    ui.add(egui::Label::new(RichText::new(texts::better(&state.status.next)).weak()).wrap());
+    ui.add(
+        egui::Label::new(RichText::new(texts::better(&state.status.action, state.begun, state.passed.is_some())).weak())
+            .wrap(),
+    );
     ui.add_space(theme::GAP);
 }
 
