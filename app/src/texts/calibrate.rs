@@ -1,6 +1,6 @@
 //! The Calibrate room.
 
-use crate::rooms::calibrate::{BOARDS, Pose, State, Step, Task};
+use crate::rooms::calibrate::{BOARDS, Entry, Kept, Pose, State, Step, Task};
 use weavelight::calibrate::{Action, SeenSheet};
 
 /// The button that takes the pictures of a task.
@@ -66,12 +66,13 @@ pub const NEVER: &str = "Not calibrated yet.";
 pub const EXPIRES: &str = "Counts as old after";
 /// Its unit.
 pub const DAYS: &str = " days";
-/// The heading of earlier calibrations.
-pub const HISTORY: &str = "Earlier calibrations";
-/// Where there are none.
-pub const NO_HISTORY: &str = "None yet.";
-/// The button that takes one back into use.
-pub const RESTORE: &str = "Restore";
+/// The heading of earlier calibrations and pictures.
+pub const HISTORY: &str = "History";
+/// While things are put there.
+pub const PUTTING_AWAY: &str = "Putting what is there into the history";
+/// Where there is nothing.
+pub const NO_HISTORY: &str =
+    "Empty. Earlier calibrations, and pictures that are taken again, are kept here.";
 /// While pictures are looked at.
 pub const LOOKING: &str = "Looking at the pictures";
 /// While a test shot is taken.
@@ -382,18 +383,40 @@ pub fn expired(days: i64) -> String {
     )
 }
 
-/// An entry of the history: `calibration-2026-11-22T1648` as people write it.
-pub fn entry(name: &str) -> String {
-    let stamp = name.strip_prefix("calibration-").unwrap_or(name);
-    match stamp.split_once('T') {
+/// Where something is that was put away, from the rig's folder on.
+pub fn where_kept(name: &str) -> String {
+    format!("history/{name}")
+}
+
+/// That it is there.
+pub fn kept(name: &str) -> String {
+    format!("What was there before is kept in the rig's folder, under {}.", where_kept(name))
+}
+
+/// An entry of the history: its stamp, `2026-11-22T1648`, as people write it.
+pub fn entry(entry: &Entry) -> String {
+    let stamp = &entry.stamp;
+    let when = match stamp.split_once('T') {
         Some((day, time)) if time.len() >= 4 && time.is_char_boundary(2) => {
             format!("{day} {}:{} UTC", &time[..2], &time[2..])
         }
-        _ => stamp.to_owned(),
+        _ => stamp.clone(),
+    };
+    match entry.kept {
+        Kept::Calibration => when,
+        Kept::Pictures(of) => format!("{}: pictures only\n{when}", step(of)),
     }
 }
 
-/// The button's name to those who do not see where it is.
-pub fn restore(when: &str) -> String {
-    format!("Restore the calibration of {when}")
+/// The button beside it.
+pub fn restore(kept: Kept) -> &'static str {
+    match kept {
+        Kept::Calibration => "Restore",
+        Kept::Pictures(_) => "Put back",
+    }
+}
+
+/// Its name to those who do not see where it is.
+pub fn restore_name(of: &Entry) -> String {
+    format!("{}, {}", restore(of.kept), entry(of).replace('\n', ", "))
 }

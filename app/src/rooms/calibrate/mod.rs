@@ -10,17 +10,19 @@ mod task;
 mod view;
 mod work;
 
+pub use history::{Entry, Kept};
 pub use picture::{Marks, Picture};
 pub use task::{BOARDS, Pose, State, Step, TargetSettings, Task};
 pub use work::Memory;
 
 use crate::browse::Browse;
-use crate::desk::{Brake, Desk};
+use crate::desk::{Brake, Desk, Severity};
 use crate::rooms::Room;
 use crate::texts::calibrate as texts;
 use crate::theme;
-use crate::worker::{Command, Outbox, Tools};
+use crate::worker::{Command, Ended, Outbox, Tools};
 use eframe::egui;
+use std::path::PathBuf;
 use weavelight::calibrate::{CameraReport, CheckReport, ColorReport, LightsReport};
 
 /// What this room asks of the worker.
@@ -34,12 +36,12 @@ pub enum Ask {
     Look(Task, TargetSettings),
     /// The fit of a step.
     Fit(Step),
-    /// The pictures of a step into the history; the calibration stays until the new one is made.
+    /// The pictures of a step into the history, to take them again; the calibration stays until the new one is made.
     Again(Step),
     /// Everything into the history, and from the beginning.
     Anew,
-    /// An earlier calibration back.
-    Restore(String),
+    /// An earlier calibration, or a step's pictures, back.
+    Restore(Entry),
 }
 
 /// What came of a fit.
@@ -64,8 +66,10 @@ pub enum Told {
     Picture(Box<Picture>),
     /// What came of a fit.
     Report(Report),
+    /// What was there before is in this folder now.
+    Kept(PathBuf),
     /// Something failed or was stopped: nothing goes on by itself.
-    Halted,
+    Halted(Ended),
 }
 
 /// What this room keeps.
@@ -79,6 +83,12 @@ pub struct Calibrate {
     view: view::View,
     /// What came of camera, colour, lights and check.
     figures: [Option<String>; 4],
+    /// A check of a calibration that is finished is wanted.
+    checking: bool,
+    /// What went wrong with what was asked for last, and what to do.
+    trouble: Option<String>,
+    /// Where the last thing went that was put away.
+    kept: Option<PathBuf>,
 }
 
 impl Calibrate {
@@ -92,7 +102,7 @@ impl Calibrate {
         pane.show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
         });
-        let task = self.state.as_ref().map(|state| state.next());
+        let task = self.wanted();
         if let (Some(task), Some(state)) = (task, &self.state)
             && let Some(draw) = coverage::of(task)
         {
@@ -108,27 +118,43 @@ impl Calibrate {
         });
     }
 
+    /// The one thing to do now.
+    fn wanted(&self) -> Option<Task> {
+        let next = self.state.as_ref()?.next();
+        let check = self.checking && next == Task::Done;
+        Some(if check { Task::Sheet(Pose::Check) } else { next })
+    }
+
+    /// Leaves something to the worker; what was told of the last thing is put away.
+    fn ask(&mut self, ask: Ask, desk: &mut Desk) {
+        (self.trouble, self.kept) = (None, None);
+        desk.ask(Command::Calibrate(ask));
+    }
+
     fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         ui.heading(crate::texts::rooms::CALIBRATE);
+        let now = self.wanted().and_then(Task::step);
         let Some(state) = &self.state else { return };
-        let now = state.next().step();
+        let free = !desk.is_busy();
+        let mut wanted = None;
         for step in Step::ALL {
-            let again = view::step(ui, state, step, now, self.figures[step as usize].as_deref());
-            if again && !desk.is_busy() {
-                desk.ask(Command::Calibrate(Ask::Again(step)));
+            let figures = self.figures[step as usize].as_deref();
+            if view::step(ui, state, step, now, figures) && free {
+                self.checking = step == Step::Check;
+                wanted = Some(Ask::Again(step));
             }
         }
         ui.separator();
         view::age(ui, state, &mut desk.settings.targets);
         let anything = state.begun || state.age_days.is_some();
         let anew = egui::Button::new(texts::ANEW);
-        let free = !desk.is_busy() && anything;
-        if ui.add_enabled(free, anew).on_hover_text(texts::ANEW_HINT).clicked() {
-            desk.ask(Command::Calibrate(Ask::Anew));
+        if ui.add_enabled(free && anything, anew).on_hover_text(texts::ANEW_HINT).clicked() {
+            wanted = Some(Ask::Anew);
         }
         ui.separator();
-        if let Some(entry) = view::history(ui, state, !desk.is_busy()) {
-            desk.ask(Command::Calibrate(Ask::Restore(entry)));
+        let entry = view::history(ui, state, free);
+        if let Some(ask) = entry.map(Ask::Restore).or(wanted) {
+            self.ask(ask, desk);
         }
     }
 
@@ -137,6 +163,7 @@ impl Calibrate {
         let Some(state) = &self.state else { return };
         let simulated = desk.place.as_ref().is_some_and(view::lays_by_itself);
         view::instructions(ui, task, state, simulated);
+        view::told(ui, self.trouble.as_deref(), self.kept.as_deref());
         if task == Task::Done {
             view::verdict(ui, state);
             let size = egui::vec2(220.0, theme::BIG);
@@ -146,8 +173,7 @@ impl Calibrate {
             ui.add_space(theme::GAP);
             return;
         }
-        let needs_opencv = task.step() == Some(Step::Camera) || !simulated;
-        if needs_opencv && !cfg!(feature = "opencv") && task.step() == Some(Step::Camera) {
+        if !state.sees_chessboards && task.step() == Some(Step::Camera) {
             view::no_chessboards(ui);
             return;
         }
@@ -176,10 +202,13 @@ impl Calibrate {
                 let look = egui::Button::new(texts::LOOK).min_size(small);
                 if ui.add_enabled(!busy, look).on_hover_text(texts::LOOK_HINT).clicked() {
                     let targets = desk.settings.targets.clone();
-                    desk.ask(Command::Calibrate(Ask::Look(task, targets)));
+                    self.ask(Ask::Look(task, targets), desk);
                 }
             }
-            if simulated && !self.auto {
+            if self.checking && ui.add_enabled(!busy, not_now(small)).clicked() {
+                self.checking = false;
+            }
+            if simulated && !self.auto && !self.checking {
                 let auto = egui::Button::new(texts::AUTO).min_size(small);
                 if ui.add_enabled(!busy, auto).on_hover_text(texts::AUTO_HINT).clicked() {
                     self.auto = true;
@@ -199,7 +228,7 @@ impl Calibrate {
             Task::Fit(step) => Ask::Fit(step),
             task => Ask::Take(task, desk.settings.targets.clone()),
         };
-        desk.ask(Command::Calibrate(ask));
+        self.ask(ask, desk);
     }
 
     /// Takes in what the worker tells.
@@ -208,6 +237,7 @@ impl Calibrate {
             Told::State(state) => {
                 let task = state.next();
                 desk.calibration_age_days = state.age_days;
+                self.checking &= state.passed.is_none() && task == Task::Done;
                 self.state = Some(state);
                 match (self.auto, task) {
                     (true, Task::Done | Task::Fit(_)) => self.auto = false,
@@ -220,7 +250,14 @@ impl Calibrate {
                 let (step, text) = figures::text(&report);
                 self.figures[step as usize] = Some(text);
             }
-            Told::Halted => self.auto = false,
+            Told::Kept(folder) => self.kept = Some(folder),
+            Told::Halted(ended) => {
+                self.auto = false;
+                // The error was put up just before.
+                let newest = desk.problems.iter().rev().find(|it| it.severity == Severity::Error);
+                let newest = newest.filter(|_| ended == Ended::Failed);
+                self.trouble = newest.map(|problem| problem.text.clone());
+            }
         }
     }
 
@@ -228,6 +265,10 @@ impl Calibrate {
     pub fn reset(&mut self) {
         *self = Self::default();
     }
+}
+
+fn not_now(size: egui::Vec2) -> egui::Button<'static> {
+    egui::Button::new(texts::NOT_NOW).min_size(size)
 }
 
 /// The worker's part.

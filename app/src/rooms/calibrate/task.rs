@@ -1,5 +1,6 @@
 //! What is to be done next, as a function of what is there.
 
+use super::history::Entry;
 use serde::{Deserialize, Serialize};
 use weavelight::calibrate::{BoardsSoFar, Foreseen, Status, StepState};
 
@@ -19,7 +20,22 @@ pub enum Step {
 impl Step {
     /// In the order of the work.
     pub const ALL: [Step; 4] = [Step::Camera, Step::Color, Step::Lights, Step::Check];
+
+    /// Folders of its capture sessions.
+    pub fn folders(self) -> Vec<String> {
+        match self {
+            Step::Camera => vec![BOARD.to_owned()],
+            Step::Color => vec![GREY.to_owned()],
+            Step::Lights => Pose::FIT.into_iter().map(Pose::folder).collect(),
+            Step::Check => vec![Pose::Check.folder()],
+        }
+    }
 }
+
+/// The folder of the chessboard's capture session.
+pub(super) const BOARD: &str = "board";
+/// And of the chart's.
+pub(super) const GREY: &str = "grey";
 
 /// How a white sheet lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,8 +135,10 @@ pub struct State {
     pub passed: Option<bool>,
     /// Days since the oldest part was made.
     pub age_days: Option<i64>,
-    /// Earlier calibrations, the newest first.
-    pub history: Vec<String>,
+    /// Earlier calibrations and pictures, the newest first.
+    pub history: Vec<Entry>,
+    /// Whether chessboards can be seen: a build with OpenCV.
+    pub sees_chessboards: bool,
 }
 
 /// Pictures of the board that a good camera needs.
@@ -244,6 +262,7 @@ mod tests {
             passed: None,
             age_days: None,
             history: Vec::new(),
+            sees_chessboards: true,
         }
     }
 

@@ -1,5 +1,6 @@
 //! How the wizard looks.
 
+use super::history::Entry;
 use super::picture::{Picture, paint_earlier};
 use super::task::{State, Step, TargetSettings, Task};
 use crate::browse::Browse;
@@ -8,6 +9,7 @@ use crate::texts::calibrate as texts;
 use crate::theme::{self, meaning};
 use crate::widgets::Sign;
 use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
+use std::path::Path;
 use weavelight::calibrate::StepState;
 use weavelight::instrument::CameraKind;
 
@@ -174,10 +176,31 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
         line(Sign::Warning, advice);
     }
     ui.add(
-        egui::Label::new(RichText::new(texts::better(&state.status.action, state.begun, state.passed.is_some())).weak())
-            .wrap(),
+        egui::Label::new(
+            RichText::new(texts::better(&state.status.action, state.begun, state.passed.is_some()))
+                .weak(),
+        )
+        .wrap(),
     );
     ui.add_space(theme::GAP);
+}
+
+/// What went wrong last and what to do, and where something went that was put away.
+pub(super) fn told(ui: &mut egui::Ui, trouble: Option<&str>, kept: Option<&Path>) {
+    if let Some(trouble) = trouble {
+        ui.horizontal_top(|ui| {
+            Sign::Bad.ui(ui);
+            ui.add(egui::Label::new(trouble).wrap().selectable(true));
+        });
+    }
+    if let Some(folder) = kept {
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        ui.horizontal_top(|ui| {
+            Sign::Good.ui(ui);
+            ui.add(egui::Label::new(texts::kept(&name)).wrap())
+                .on_hover_text(folder.display().to_string());
+        });
+    }
 }
 
 /// A build without OpenCV.
@@ -265,19 +288,19 @@ pub(super) fn age(ui: &mut egui::Ui, state: &State, targets: &mut TargetSettings
     });
 }
 
-/// Earlier calibrations; the one that is to be restored.
-pub(super) fn history(ui: &mut egui::Ui, state: &State, free: bool) -> Option<String> {
+/// Earlier calibrations and pictures; the one that is to be restored.
+pub(super) fn history(ui: &mut egui::Ui, state: &State, free: bool) -> Option<Entry> {
     ui.label(RichText::new(texts::HISTORY).strong());
     if state.history.is_empty() {
-        ui.label(RichText::new(texts::NO_HISTORY).weak());
+        ui.add(egui::Label::new(RichText::new(texts::NO_HISTORY).weak()).wrap());
     }
     let mut restore = None;
     for entry in &state.history {
         ui.horizontal(|ui| {
-            let when = texts::entry(entry);
-            ui.label(&when);
-            let button = ui.add_enabled(free, egui::Button::new(texts::RESTORE).small());
-            name(ui, &button, &texts::restore(&when));
+            ui.label(texts::entry(entry)).on_hover_text(texts::where_kept(&entry.name));
+            let text = texts::restore(entry.kept);
+            let button = ui.add_enabled(free, egui::Button::new(text).small());
+            name(ui, &button, &texts::restore_name(entry));
             if button.clicked() {
                 restore = Some(entry.clone());
             }

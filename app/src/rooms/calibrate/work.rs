@@ -1,11 +1,11 @@
 //! The worker's part: pictures of targets, what is seen in them, and the fits.
 
 use super::picture::{Marks, Picture};
-use super::task::{Pose, State, Step, TargetSettings, Task};
+use super::task::{BOARD, GREY, Pose, State, Step, TargetSettings, Task};
 use super::{Ask, Report, Told, foresee::Sheets, history};
 use crate::place::Place;
 use crate::texts::calibrate as texts;
-use crate::worker::{Outbox, Tools, Update, instruments::with_instruments};
+use crate::worker::{Ended, Outbox, Tools, Update, instruments::with_instruments};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use weavelight::calibrate::{
@@ -38,13 +38,13 @@ pub struct Memory {
 const THRESHOLD_DEG: f64 = 0.1;
 /// Exposure of a look that keeps nothing, seconds.
 const LOOK_S: f64 = 0.1;
-const BOARD: &str = "board";
-const GREY: &str = "grey";
+/// The folder of the last sheet that could not serve.
+const REFUSED: &str = "refused";
 
 pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
     let Some(place) = tools.place.clone() else { return };
-    let went_well = match ask {
-        Ask::Refresh => true,
+    let done = match ask {
+        Ask::Refresh => Ok(()),
         Ask::Take(task, targets) => take(task, &targets, tools, out),
         Ask::Look(task, targets) => look(task, &targets, tools, out),
         Ask::Fit(step) => fit(step, &place, tools, out),
@@ -52,8 +52,8 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         Ask::Anew => told(anew(&place), out),
         Ask::Restore(entry) => told(history::restore(&place, &entry), out),
     };
-    if !went_well {
-        out.tell(Update::Calibrate(Told::Halted));
+    if let Err(ended) = done {
+        out.tell(Update::Calibrate(Told::Halted(ended)));
     }
     let state = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
     if let Ok(state) = state {
@@ -61,8 +61,19 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
     }
 }
 
-fn told<E: std::fmt::Display>(result: Result<(), E>, out: &Outbox) -> bool {
-    result.inspect_err(|error| out.fail(texts::HISTORY, error)).is_ok()
+/// Says where what was there before is now.
+fn told<E: std::fmt::Display>(
+    moved: Result<Option<PathBuf>, E>,
+    out: &Outbox,
+) -> Result<(), Ended> {
+    let moved = moved.map_err(|error| {
+        out.fail(texts::PUTTING_AWAY, &error);
+        Ended::Failed
+    })?;
+    if let Some(folder) = moved {
+        out.tell(Update::Calibrate(Told::Kept(folder)));
+    }
+    Ok(())
 }
 
 /// Lays a target on the simulated table, and the swatch back when it is done with.
@@ -153,21 +164,31 @@ fn subject(
     })
 }
 
-/// Takes the pictures of a task, looks at them, and fits where they were the last. Whether all went well.
-fn take(task: Task, settings: &TargetSettings, tools: &mut Tools, out: &Outbox) -> bool {
-    let Some(place) = tools.place.clone() else { return false };
+/// Takes the pictures of a task, looks at them, and fits where they were the last.
+fn take(
+    task: Task,
+    settings: &TargetSettings,
+    tools: &mut Tools,
+    out: &Outbox,
+) -> Result<(), Ended> {
+    let Some(place) = tools.place.clone() else { return Ok(()) };
     let taken = out.job(&texts::taking(task), || {
         with_instruments(tools, |place, with| photograph(task, settings, (place, with), out))
     });
-    let Ok(true) = taken else { return false };
+    if !taken? {
+        return Err(Ended::Cancelled);
+    }
     let memory = &mut tools.calibrate;
     let looked = out.job(texts::LOOKING, || examine(task, &place, &mut memory.sheets, out));
-    let Ok(good) = looked else { return false };
+    let good = looked?;
     // The fit follows its last picture.
     let next = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
-    match next.map(|state| state.next()) {
-        Ok(Task::Fit(step)) => good && fit(step, &place, tools, out),
-        _ => true,
+    match next?.next() {
+        Task::Fit(step) if good => fit(step, &place, tools, out),
+        Task::Fit(_) => Err(Ended::Cancelled),
+        // Of a calibration that was made elsewhere.
+        _ if task == Task::Sheet(Pose::Check) => fit(Step::Check, &place, tools, out),
+        _ => Ok(()),
     }
 }
 
@@ -182,6 +203,7 @@ fn photograph(
     let pictures = Session::load(&folder).map_or(0, |session| session.frames.len());
     let (_table, laid) = Table::lay(place, lying(task, pictures))?;
     let (subject, thickness_mm) = subject(task, settings, laid)?;
+    let is_new = !place.targets().exists();
     std::fs::create_dir_all(place.targets())?;
     let options = Options {
         folder,
@@ -196,6 +218,10 @@ fn photograph(
     let scanned = out.with_control(|control| {
         scan::scan(&place.rig, &options, &with.board, with.camera.as_mut(), control, &tell)
     });
+    if is_new && scanned.is_err() {
+        // Empty, it would say that a calibration has begun.
+        let _ = std::fs::remove_dir(place.targets());
+    }
     match scanned {
         Ok(summary) => {
             out.warn(&texts::title(task), &summary.warnings);
@@ -219,7 +245,12 @@ fn hear(event: &Event, out: &Outbox) {
 }
 
 /// A test shot of what lies there; nothing is kept.
-fn look(task: Task, settings: &TargetSettings, tools: &mut Tools, out: &Outbox) -> bool {
+fn look(
+    task: Task,
+    settings: &TargetSettings,
+    tools: &mut Tools,
+    out: &Outbox,
+) -> Result<(), Ended> {
     let looked = out.job(texts::TAKING_LOOK, || {
         with_instruments(tools, |place, with| -> Result<Picture, AnyError> {
             let folder = place.targets().join(session_name(task));
@@ -240,13 +271,8 @@ fn look(task: Task, settings: &TargetSettings, tools: &mut Tools, out: &Outbox) 
             })
         })
     });
-    match looked {
-        Ok(picture) => {
-            out.tell(Update::Calibrate(Told::Picture(Box::new(picture))));
-            true
-        }
-        Err(_) => false,
-    }
+    out.tell(Update::Calibrate(Told::Picture(Box::new(looked?))));
+    Ok(())
 }
 
 fn board_picture(frame: &Frame, board: &Board, seen: Option<SeenBoard>) -> Picture {
@@ -315,7 +341,7 @@ fn examine(task: Task, place: &Place, sheets: &mut Sheets, out: &Outbox) -> Resu
 
 /// Out of the way of the fit; the last one that was refused can still be looked at.
 fn put_aside(place: &Place, folder: &Path) -> std::io::Result<()> {
-    let refused = place.targets().join("refused");
+    let refused = place.targets().join(REFUSED);
     if refused.exists() {
         std::fs::remove_dir_all(&refused)?;
     }
@@ -326,8 +352,8 @@ fn read(session: &Session, entry: &FrameEntry) -> Result<Frame, AnyError> {
     Ok(decode(&session.read_frame(entry)?, &Hint::default())?)
 }
 
-/// The fit of a step, the same call as the command line's. Whether there is one.
-fn fit(step: Step, place: &Place, tools: &mut Tools, out: &Outbox) -> bool {
+/// The fit of a step, the same call as the command line's.
+fn fit(step: Step, place: &Place, tools: &mut Tools, out: &Outbox) -> Result<(), Ended> {
     let (rig, targets, calibration) = (place.rig_file(), place.targets(), place.calibration());
     let progress = |share: f64, what: &str| out.tick(share, what);
     let fitted = out.job(texts::fitting(step), || -> Result<(Report, Vec<String>), AnyError> {
@@ -371,10 +397,10 @@ fn fit(step: Step, place: &Place, tools: &mut Tools, out: &Outbox) -> bool {
             }
         })
     });
-    let Ok((report, warnings)) = fitted else { return false };
+    let (report, warnings) = fitted?;
     out.warn(texts::fitting(step), &warnings);
     out.tell(Update::Calibrate(Told::Report(report)));
-    true
+    Ok(())
 }
 
 /// The sheets that the lights are calibrated with.
@@ -392,26 +418,29 @@ fn lights_hash(place: &Place) -> Option<String> {
     sha256_of_file(&place.calibration().join("lights.toml")).ok()
 }
 
-/// The pictures of a step, and of all that follow from them, into the history.
-fn again(step: Step, place: &Place) -> Result<(), AnyError> {
-    let targets = place.targets();
-    let folders: Vec<PathBuf> = match step {
+/// The pictures of a step, and of all that follow from them, into the history. Where they are now.
+fn again(step: Step, place: &Place) -> Result<Option<PathBuf>, AnyError> {
+    match step {
         // Everything stands in the camera's frame.
-        Step::Camera => return anew(place),
-        Step::Color => vec![targets.join(GREY)],
-        Step::Lights => Pose::FIT.iter().map(|pose| targets.join(pose.folder())).collect(),
-        Step::Check => vec![targets.join(Pose::Check.folder())],
-    };
-    for folder in folders.into_iter().filter(|folder| folder.exists()) {
-        std::fs::remove_dir_all(&folder)?;
+        Step::Camera => anew(place),
+        step => Ok(history::put_away(place, step)?),
     }
-    Ok(())
 }
 
 /// That the folder is there says that a calibration is under way.
-fn anew(place: &Place) -> Result<(), AnyError> {
-    history::keep(place)?;
-    Ok(std::fs::create_dir_all(place.targets())?)
+fn anew(place: &Place) -> Result<Option<PathBuf>, AnyError> {
+    let kept = history::keep(place)?;
+    std::fs::create_dir_all(place.targets())?;
+    Ok(kept)
+}
+
+/// Whether the pictures of a calibration are there, or it is to be made anew. A check alone is none: the calibration that was
+/// checked may come from elsewhere.
+fn begun(place: &Place) -> bool {
+    let Ok(entries) = std::fs::read_dir(place.targets()) else { return false };
+    let names: Vec<_> = entries.flatten().map(|entry| entry.file_name()).collect();
+    let of_a_check = |name: &std::ffi::OsString| *name == *Pose::Check.folder() || name == REFUSED;
+    names.is_empty() || !names.iter().all(of_a_check)
 }
 
 /// What is there.
@@ -431,7 +460,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
     let now = lights_hash(place);
     let passed = memory.passed.as_ref().filter(|(hash, _)| Some(hash) == now.as_ref());
     let mut state = State {
-        begun: place.targets().exists(),
+        begun: begun(place),
         boards: [seen.len(), found.len()],
         table,
         corners_px: found.iter().flat_map(|seen| seen.corners_px().to_vec()).collect(),
@@ -441,6 +470,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
         passed: passed.map(|(_, passed)| *passed).filter(|_| sheets.contains(&Pose::Check)),
         age_days: calibration.as_ref().and_then(crate::place::age_days),
         history: history::entries(place),
+        sees_chessboards: cfg!(feature = "opencv"),
         sheets,
         foreseen: None,
         status,
