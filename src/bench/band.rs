@@ -150,7 +150,10 @@ impl Output {
             parts.zip(self.error.par_chunks_mut(WIDTH)).zip(self.residual.par_chunks_mut(WIDTH));
         let parts = parts.zip(self.outcome.par_chunks_mut(WIDTH)).enumerate();
         parts.map(|(row, ((((normal, albedo), expected_error_deg), residual), outcome))| {
-            (row, RowOutput { normal, albedo, expected_error_deg, residual, outcome, kept: None })
+            (
+                row,
+                RowOutput { normal, albedo, expected_error_deg, residual, outcome, support: None },
+            )
         })
     }
 }

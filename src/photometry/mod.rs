@@ -44,5 +44,5 @@ pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};
 pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
 pub(crate) use reference::{inverse_if_conditioned, variance};
-pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, VarianceModel};
+pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, Support, VarianceModel};
 pub use solve_row::RowSolver;

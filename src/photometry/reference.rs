@@ -8,7 +8,7 @@ use super::method::{
     LIT_ABOVE_FLOOR, MAX_LIGHTS, MOST_LENGTHENING, Method, RELATIVE_FLOOR, REWEIGHTINGS,
     START_LEVEL, START_SAMPLES, WEIGHTED_CONDITION_SQUARED,
 };
-use super::row::{Outcome, RowInput, RowOutput, VarianceModel};
+use super::row::{Outcome, RowInput, RowOutput, Support, VarianceModel};
 
 /// One photosite solved, or why not.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,8 +39,8 @@ pub struct Fit {
     pub residual: f64,
     /// What the subset test did.
     pub outcome: Outcome,
-    /// Bit i is set if the sample of light i took part.
-    pub kept: u64,
+    /// Which samples it rests on.
+    pub support: Support,
 }
 
 /// The samples of one photosite. All slices have one entry a light.
@@ -65,12 +65,15 @@ pub(crate) struct Solution {
     pub(crate) weights: [f64; MAX_LIGHTS],
     /// The fit that albedo is taken from, where it is another one: g and its covariance.
     pub(crate) clear: Option<(Vector3<f64>, Matrix3<f64>)>,
+    /// Bit i is set if the subset test dropped the sample of light i.
+    pub(crate) dropped: u64,
 }
 
 impl Solution {
-    fn kept(&self) -> u64 {
+    fn support(&self) -> Support {
         let lights = self.weights.iter().enumerate();
-        lights.filter(|(_, w)| **w > 0.0).fold(0, |kept, (i, _)| kept | 1 << i)
+        let kept = lights.filter(|(_, w)| **w > 0.0).fold(0, |kept, (i, _)| kept | 1 << i);
+        Support { kept, dropped: self.dropped }
     }
 }
 
@@ -135,7 +138,7 @@ impl Samples<'_> {
             }
         }
         let inverse = inverse_if_conditioned(&normal_matrix)?;
-        Some(Solution { g: inverse * right, inverse, weights, clear: None })
+        Some(Solution { g: inverse * right, inverse, weights, clear: None, dropped: 0 })
     }
 
     /// Weighted solution; `plain` is the solution with every usable sample. Where all samples are there, noise explains the
@@ -288,7 +291,7 @@ impl Samples<'_> {
             expected_error,
             residual,
             outcome,
-            kept: solution.kept(),
+            support: solution.support(),
         })
     }
 
@@ -401,7 +404,7 @@ impl RowOutput<'_> {
             fit.expected_error.to_degrees().min(MOST_ERROR_DEG) as f32;
         self.residual[column] = fit.residual.min(f64::from(f32::MAX)) as f32;
         self.outcome[column] = fit.outcome;
-        self.keep(column, fit.kept);
+        self.note(column, fit.support);
     }
 }
 

@@ -21,7 +21,8 @@ impl Samples<'_> {
         let first = self.search(&self.first_weights(usable))?;
         let g = self.reweighted(&first)?.g;
         let second = self.search(&self.weights_at(&g, usable, true))?;
-        let solution = self.settle_albedo(self.reweighted(&second)?);
+        let dropped = set_of(&second.dropped);
+        let solution = self.settle_albedo(Solution { dropped, ..self.reweighted(&second)? });
         let outcome = self.judge(&solution, &second);
         Some((solution, outcome))
     }
@@ -156,6 +157,11 @@ impl Samples<'_> {
         let used = solution.weights.iter().filter(|&&w| w > 0.0).count();
         self.chi_square(solution) <= chi_square_limit(used.saturating_sub(3))
     }
+}
+
+/// Bit i is set if light i is among them.
+fn set_of(lights: &Lights) -> u64 {
+    lights.iter().enumerate().fold(0, |set, (i, is_in)| set | u64::from(*is_in) << i)
 }
 
 /// What a search found: the fit without the samples it dropped.

@@ -96,9 +96,10 @@ fn medians(block: &Block) -> Lanes {
     median
 }
 
-/// What the dropped samples of each photosite have in common.
+/// Which samples of each photosite were dropped, and what they have in common.
 fn judge(block: &Block, dropped: &[u64; LANES], solved: &mut Weighted) {
     for k in 0..block.len {
+        solved.surface.dropped[k] = dropped[k];
         let (mut dark, mut bright) = (false, false);
         for (_, sample) in
             block.sample.iter().enumerate().filter(|&(i, _)| dropped[k] >> i & 1 == 1)

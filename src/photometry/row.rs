@@ -99,9 +99,19 @@ pub struct RowOutput<'a> {
     pub residual: &'a mut [f32],
     /// What became of each photosite.
     pub outcome: &'a mut [Outcome],
-    /// Where asked for: bit i is set if the sample of light i took part in the fit; 0 where unsolved. (Colour pictures find
-    /// the albedo of each channel from the samples that the normal rests on.)
-    pub kept: Option<&'a mut [u64]>,
+    /// Where asked for: which samples took part in the fit; none where unsolved. (Colour pictures find the albedo of each
+    /// channel from the samples that the normal rests on.)
+    pub support: Option<&'a mut [Support]>,
+}
+
+/// Which samples a fit rests on; bit i stands for light i. A usable sample in neither set was set aside before any test: the
+/// fit has the surface turned away from its light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Support {
+    /// Samples that took part.
+    pub kept: u64,
+    /// Samples that the subset test dropped, because they contradict the rest.
+    pub dropped: u64,
 }
 
 impl RowOutput<'_> {
@@ -112,13 +122,13 @@ impl RowOutput<'_> {
         self.expected_error_deg[column] = 0.0;
         self.residual[column] = 0.0;
         self.outcome[column] = outcome;
-        self.keep(column, 0);
+        self.note(column, Support::default());
     }
 
     /// Notes which samples a fit rests on.
-    pub(crate) fn keep(&mut self, column: usize, lights: u64) {
-        if let Some(kept) = &mut self.kept {
-            kept[column] = lights;
+    pub(crate) fn note(&mut self, column: usize, of_fit: Support) {
+        if let Some(support) = &mut self.support {
+            support[column] = of_fit;
         }
     }
 }
@@ -189,8 +199,8 @@ pub(crate) fn check_shapes(input: &RowInput, output: &RowOutput) -> Result<(), R
     same("albedo", output.albedo.len(), width)?;
     same("expected error", output.expected_error_deg.len(), width)?;
     same("residual", output.residual.len(), width)?;
-    if let Some(kept) = &output.kept {
-        same("kept lights", kept.len(), width)?;
+    if let Some(support) = &output.support {
+        same("kept lights", support.len(), width)?;
     }
     let nodes = if width == 0 { 0 } else { (width - 1).div_ceil(input.field.step.max(1)) + 1 };
     same("light field", input.field.vectors.len(), nodes.max(input.field.nodes()) * lights)

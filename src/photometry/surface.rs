@@ -2,7 +2,7 @@
 
 use super::block::{Block, LANES, Lanes, Sample, ZERO};
 use super::reference::MOST_ERROR_DEG;
-use super::row::{Outcome, RowOutput};
+use super::row::{Outcome, RowOutput, Support};
 
 /// Albedo times normal of a block, with what is known about it. Light vectors are in units of `Pieces::unit`.
 pub(crate) struct Surface {
@@ -16,6 +16,8 @@ pub(crate) struct Surface {
     pub(crate) carried: [bool; LANES],
     /// What the subset test says of a solved photosite.
     pub(crate) outcome: [Outcome; LANES],
+    /// Samples that it dropped, bit i for light i.
+    pub(crate) dropped: [u64; LANES],
     /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
     pub(crate) most_lengthening: f32,
     /// Albedo of the lights clear of the horizon over that of all; see [`CLEAR_DEVIATIONS`](super::method::CLEAR_DEVIATIONS).
@@ -45,6 +47,7 @@ impl Surface {
             count: ZERO,
             carried,
             outcome,
+            dropped: [0; LANES],
             most_lengthening,
             albedo_share: [1.0; LANES],
         }
@@ -116,7 +119,7 @@ impl Surface {
                 & (residual[k] < f32::MAX);
         }
         let solved = Solved { normal, albedo, error_deg, residual };
-        let mut plain = block.is_run() & output.kept.is_none();
+        let mut plain = block.is_run() & output.support.is_none();
         for k in 0..LANES {
             plain &= good[k] & (solved.normal[2][k] > 0.0);
         }
@@ -156,8 +159,8 @@ impl Surface {
         output.expected_error_deg[column] = solved.error_deg[k];
         output.residual[column] = solved.residual[k];
         output.outcome[column] = self.outcome[k];
-        if output.kept.is_some() {
-            output.keep(column, block.kept(k));
+        if output.support.is_some() {
+            output.note(column, Support { kept: block.kept(k), dropped: self.dropped[k] });
         }
     }
 }

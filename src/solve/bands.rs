@@ -9,7 +9,7 @@ use super::residual::{ResidualRows, residual_row};
 use super::scene::Scene;
 use super::signal::{Normalizer, SignalRows};
 use crate::photometry::{
-    FieldRow, Method, Outcome, RowError, RowInput, RowOutput, RowSolver, VarianceModel,
+    FieldRow, Method, Outcome, RowError, RowInput, RowOutput, RowSolver, Support, VarianceModel,
 };
 use crate::raw::Layout;
 use rayon::prelude::*;
@@ -54,9 +54,9 @@ pub(super) struct Worker {
     rows: SignalRows,
     solver: RowSolver,
     residual: Vec<f32>,
-    kept: Vec<u64>,
-    /// Whether `kept` is filled where the albedo does not need it.
-    notes_kept: bool,
+    support: Vec<Support>,
+    /// Whether `support` is filled where the albedo does not need it.
+    notes_support: bool,
     /// The tile under way, and the one being prepared.
     pub(super) tiles: [TileRows; 2],
     /// What the fit leaves over of one light, as wide as the frame.
@@ -78,8 +78,8 @@ pub(super) struct Lone {
     pub(super) expected_error_deg: f32,
     pub(super) residual: f32,
     pub(super) outcome: Outcome,
-    /// Bit i set where the sample of light i took part.
-    pub(super) kept: u64,
+    /// Which samples it rests on.
+    pub(super) support: Support,
     /// Per light: y, NaN where unusable; and its vector.
     pub(super) signal: Vec<f32>,
     pub(super) vectors: Vec<[f64; 3]>,
@@ -204,7 +204,7 @@ impl<'a> Run<'a> {
         mut take: impl FnMut(usize, Lone),
     ) {
         let width = self.scene.width;
-        let mut worker = Worker { notes_kept: true, ..Worker::default() };
+        let mut worker = Worker { notes_support: true, ..Worker::default() };
         let (mut normal, mut rgb) = (vec![[0.0; 3]; width], vec![[0.0; 3]; width]);
         let (mut albedo, mut expected_error_deg) = (vec![0.0; width], vec![0.0; width]);
         let mut outcome = vec![Outcome::Masked; width];
@@ -233,7 +233,7 @@ impl<'a> Run<'a> {
                 expected_error_deg: expected_error_deg[x],
                 residual: worker.residual[at],
                 outcome: outcome[x],
-                kept: worker.kept[at],
+                support: worker.support[at],
                 signal: signals.iter().map(|row| row[at]).collect(),
                 vectors: (0..field.lights).map(|light| field.at(at, light).into()).collect(),
             };
@@ -301,10 +301,10 @@ impl<'a> Run<'a> {
         counts: &mut Counts,
         kernel: impl FnOnce(&mut RowSolver, &RowInput, &mut RowOutput) -> Result<(), RowError>,
     ) {
-        let Worker { solver, residual, kept, notes_kept, of_light, .. } = worker;
+        let Worker { solver, residual, support, notes_support, of_light, .. } = worker;
         let inside = self.inside(y, &columns);
         residual.resize(columns.len(), 0.0);
-        kept.resize(columns.len(), 0);
+        support.resize(columns.len(), Support::default());
         let at = (y - band.first_row) * self.scene.width;
         let span = at + columns.start..at + columns.end;
         let mut output = RowOutput {
@@ -313,7 +313,8 @@ impl<'a> Run<'a> {
             expected_error_deg: &mut band.expected_error_deg[span.clone()],
             residual,
             outcome: &mut band.outcome[span.clone()],
-            kept: (*notes_kept || self.scene.layout == Layout::Rgb).then_some(kept.as_mut_slice()),
+            support: (*notes_support || self.scene.layout == Layout::Rgb)
+                .then_some(support.as_mut_slice()),
         };
         let signal: Vec<&[f32]> = rows.signals().iter().map(Vec::as_slice).collect();
         let (variance, noise_scale) = (&self.variance[y & 1], rows.noise_scale());
@@ -407,7 +408,7 @@ impl<'a> Run<'a> {
                 expected_error_deg: &mut output.expected_error_deg[column..=column],
                 residual: &mut output.residual[column..=column],
                 outcome: &mut output.outcome[column..=column],
-                kept: output.kept.as_deref_mut().map(|kept| &mut kept[column..=column]),
+                support: output.support.as_deref_mut().map(|of| &mut of[column..=column]),
             };
             if solver.solve(&alone, &mut place, self.method).is_err() {
                 place.outcome.fill(Outcome::TooFewLights);
@@ -493,11 +494,11 @@ fn albedo_of_channels(
     output: &RowOutput,
     rgb: &mut [[f32; 3]],
 ) {
-    let Some(kept) = &output.kept else { return };
+    let Some(support) = &output.support else { return };
     for (column, rgb) in rgb.iter_mut().enumerate() {
         let normal = nalgebra::Vector3::from(output.normal[column]).cast::<f64>();
         let (mut along, mut square) = ([0.0; 3], 0.0);
-        for light in (0..field.lights).filter(|light| kept[column] >> light & 1 == 1) {
+        for light in (0..field.lights).filter(|light| support[column].kept >> light & 1 == 1) {
             let shading = field.at(column, light).dot(&normal);
             square += shading * shading;
             for (channel, along) in along.iter_mut().enumerate() {

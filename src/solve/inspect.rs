@@ -5,7 +5,7 @@ use super::finish::convert;
 use super::maps::is_solved;
 use super::rows::Rows;
 use super::signal::SignalRows;
-use crate::photometry::Outcome;
+use crate::photometry::{Outcome, Support};
 use crate::raw::{Layout, demosaic};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -48,9 +48,13 @@ pub enum Part {
     Used,
     /// Clipped, or the photosite is defective or masked.
     Unusable,
-    /// Darker than the others predict: in shadow.
+    /// The fit has the surface turned away from the light, or grazed by it: no light is expected, and what there is is within
+    /// noise or far from what a surface turned so far would send. Set aside before anything is tested, so that it neither
+    /// supports nor contradicts the fit.
+    TurnedAway,
+    /// Dropped as darker than the others predict: in shadow.
     TooDark,
-    /// Brighter than the others predict: a highlight.
+    /// Dropped as brighter than the others predict: a highlight.
     TooBright,
     /// Nothing was solved.
     Unsolved,
@@ -70,17 +74,16 @@ impl Rows<'_> {
         });
         let lone = found?;
         let solved = is_solved(lone.outcome);
-        let normal = Vector3::from(lone.normal).cast::<f64>();
+        let (normal, support) = (Vector3::from(lone.normal).cast::<f64>(), lone.support);
         let samples = scene.lights.iter().enumerate().map(|(k, light)| {
             let measured = Some(lone.signal[k]).filter(|y| y.is_finite());
-            let shading = normal.dot(&Vector3::from(lone.vectors[k])).max(0.0) as f32;
+            let shading = normal.dot(&Vector3::from(lone.vectors[k])) as f32;
             let predicted = solved.then_some(lone.albedo * shading);
-            let used = lone.kept >> k & 1 == 1;
             Sample {
                 light: light.index,
                 measured,
-                predicted,
-                part: part(measured, predicted, used),
+                predicted: predicted.map(|p| p.max(0.0)),
+                part: part(measured, predicted, support, 1 << k),
             }
         });
         Some(Photosite {
@@ -146,12 +149,14 @@ impl Rows<'_> {
     }
 }
 
-fn part(measured: Option<f32>, predicted: Option<f32>, used: bool) -> Part {
+/// What the solver did with a sample; `predicted` is negative where the surface turns away, `light` the light's bit.
+fn part(measured: Option<f32>, predicted: Option<f32>, support: Support, light: u64) -> Part {
     match (measured, predicted) {
         (None, _) => Part::Unusable,
         (_, None) => Part::Unsolved,
-        _ if used => Part::Used,
-        (Some(measured), Some(predicted)) if measured < predicted => Part::TooDark,
-        _ => Part::TooBright,
+        _ if support.kept & light != 0 => Part::Used,
+        _ if support.dropped & light == 0 => Part::TurnedAway,
+        (Some(measured), Some(predicted)) if measured > predicted => Part::TooBright,
+        _ => Part::TooDark,
     }
 }

@@ -91,7 +91,7 @@ impl Rows<'_> {
             noise_scale: rows.noise_scale(),
         };
         let mut output =
-            RowOutput { normal, albedo, expected_error_deg, residual, outcome, kept: None };
+            RowOutput { normal, albedo, expected_error_deg, residual, outcome, support: None };
         kernel(&input, &mut output);
     }
 }

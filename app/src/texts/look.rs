@@ -89,6 +89,7 @@ pub const FRAMES_CHANGED: &str = "The scan was changed since it was solved.";
 pub const LIGHT_COLUMNS: [&str; 4] = ["Light", "Measured", "Fit", ""];
 pub const USED: &str = "used";
 pub const CLIPPED: &str = "clipped";
+pub const TURNED_AWAY: &str = "turned away";
 pub const TOO_DARK: &str = "shadow";
 pub const TOO_BRIGHT: &str = "highlight";
 

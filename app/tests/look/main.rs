@@ -55,7 +55,7 @@ fn a_photosite_says_which_lights_it_rests_on() {
         window.query_all_by_label_contains("used").next().is_some()
     });
     let lights = window.query_all_by_label_contains("used").count();
-    let others = ["shadow", "highlight", "clipped"];
+    let others = ["shadow", "highlight", "clipped", "turned away"];
     let others: usize =
         others.iter().map(|why| window.query_all_by_label_contains(why).count()).sum();
     assert!(lights >= 3 && lights + others == 10, "{lights} used, {others} not");

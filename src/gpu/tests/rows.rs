@@ -118,7 +118,7 @@ fn check_row(name: &str, there: &Solved, here: &Solved) {
     for column in 0..here.outcome.len() {
         let place = format!("{name}, column {column}");
         assert_eq!(there.outcome[column], here.outcome[column], "{place}");
-        assert_eq!(there.kept[column], here.kept[column], "{place}: samples kept");
+        assert_eq!(there.support[column], here.support[column], "{place}: samples kept");
         let off = angle_deg(&there.normal(column), &here.normal(column));
         assert!(off <= SAME_NORMAL_DEG, "{place}: normal off by {off:e} degrees");
         for (what, a, b, tolerance) in [

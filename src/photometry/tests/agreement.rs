@@ -13,7 +13,7 @@ fn check_same(name: &str, fast: &Solved, reference: &Solved) {
     for column in 0..fast.outcome.len() {
         let place = format!("{name}, column {column}");
         assert_eq!(fast.outcome[column], reference.outcome[column], "{place}");
-        assert_eq!(fast.kept[column], reference.kept[column], "{place}: samples kept");
+        assert_eq!(fast.support[column], reference.support[column], "{place}: samples kept");
         if reference.albedo[column] < 0.01 {
             continue;
         }

@@ -3,7 +3,8 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use crate::photometry::{
-    FieldRow, Method, Outcome, RowInput, RowOutput, RowSolver, VarianceModel, reference_row,
+    FieldRow, Method, Outcome, RowInput, RowOutput, RowSolver, Support, VarianceModel,
+    reference_row,
 };
 
 /// A small generator of random numbers (SplitMix64), so that tests depend on no crate's stream.
@@ -210,7 +211,7 @@ pub(crate) struct Solved {
     pub(crate) expected_error_deg: Vec<f32>,
     pub(crate) residual: Vec<f32>,
     pub(crate) outcome: Vec<Outcome>,
-    pub(crate) kept: Vec<u64>,
+    pub(crate) support: Vec<Support>,
 }
 
 impl Solved {
@@ -221,7 +222,7 @@ impl Solved {
             expected_error_deg: vec![f32::NAN; width],
             residual: vec![f32::NAN; width],
             outcome: vec![Outcome::Masked; width],
-            kept: vec![u64::MAX; width],
+            support: vec![Support { kept: u64::MAX, dropped: u64::MAX }; width],
         }
     }
 
@@ -232,7 +233,7 @@ impl Solved {
             expected_error_deg: &mut self.expected_error_deg,
             residual: &mut self.residual,
             outcome: &mut self.outcome,
-            kept: Some(&mut self.kept),
+            support: Some(&mut self.support),
         }
     }
 

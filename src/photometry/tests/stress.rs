@@ -9,7 +9,7 @@ use super::scene::{
     Random, Scene, Solved, angle_deg, many_lights, reference_lights, reference_noise, tilted,
 };
 use crate::photometry::{
-    FieldRow, Method, Outcome, RowInput, RowSolver, VarianceModel, reference_row,
+    FieldRow, Method, Outcome, RowInput, RowSolver, Support, VarianceModel, reference_row,
 };
 
 const METHODS: [Method; 4] = [Method::LeastSquares, Method::Weighted, Method::Robust, Method::Auto];
@@ -111,7 +111,9 @@ fn check_sane(place: &str, solved: &Solved) {
         let normal = solved.normal(column);
         let values =
             [solved.albedo[column], solved.expected_error_deg[column], solved.residual[column]];
-        let place = format!("{place}, column {column}: {outcome:?} {normal:?} {values:?}");
+        let support = solved.support[column];
+        let place =
+            format!("{place}, column {column}: {outcome:?} {normal:?} {values:?} {support:?}");
         assert!(values.iter().all(|v| v.is_finite() && *v >= 0.0), "{place}");
         if matches!(
             outcome,
@@ -119,15 +121,13 @@ fn check_sane(place: &str, solved: &Solved) {
         ) {
             assert!((normal.norm() - 1.0).abs() < 1e-5 && normal.z >= 0.0, "{place}");
             assert!(values[0] > 0.0 && values[1] <= 90.0, "{place}");
-            assert!(
-                solved.kept[column].count_ones() >= 3,
-                "{place}: kept {:b}",
-                solved.kept[column]
-            );
+            assert!(support.kept.count_ones() >= 3, "{place}");
+            assert_eq!(support.kept & support.dropped, 0, "{place}");
+            assert!(outcome != Outcome::Fitted || support.dropped == 0, "{place}");
         } else {
             assert_ne!(outcome, Outcome::Masked, "{place}: left out");
             assert!(
-                normal.norm() == 0.0 && values == [0.0; 3] && solved.kept[column] == 0,
+                normal.norm() == 0.0 && values == [0.0; 3] && support == Support::default(),
                 "{place}"
             );
         }

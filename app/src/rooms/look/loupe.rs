@@ -149,6 +149,7 @@ fn verdict(part: Part) -> (Option<Sign>, &'static str) {
     match part {
         Part::Used => (None, texts::USED),
         Part::Unusable => (Some(Sign::Bad), texts::CLIPPED),
+        Part::TurnedAway => (None, texts::TURNED_AWAY),
         Part::TooDark => (Some(Sign::Warning), texts::TOO_DARK),
         Part::TooBright => (Some(Sign::Warning), texts::TOO_BRIGHT),
         Part::Unsolved => (None, texts::UNSOLVED),
