@@ -1,12 +1,16 @@
-//! The window's own time per frame on 16 megapixels: panning at one pixel to one, panning from afar, and dragging a lamp.
+//! The window's own time per frame on 16 megapixels: opening them, panning near and from afar, zooming, and dragging a lamp.
 //!
 //! Own time is everything that the window does on the processor: laying out the Look room, tessellating, sending tiles,
-//! recording the pass. What the graphics driver then does is told beside it; with a software driver that is the processor too.
+//! recording the pass and handing it over. What the graphics driver then does is told beside it; with a software driver that is
+//! the processor too.
 
 #![allow(clippy::print_stdout, reason = "a benchmark tells its figures")]
 #![allow(clippy::unwrap_used, reason = "a benchmark that cannot draw has failed")]
 
-use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
+use eframe::egui::{
+    self, Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, RawInput,
+    Rect, TouchPhase, Vec2, pos2, vec2,
+};
 use eframe::egui_wgpu::{
     RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup, wgpu,
 };
@@ -21,8 +25,10 @@ use weavelight_calibration::description::Plane;
 const SIZE_PX: [usize; 2] = [4928, 3264];
 /// The window, pixels.
 const WINDOW: [u32; 2] = [1920, 1080];
+/// Where dragging begins.
+const MIDDLE: Pos2 = pos2(700.0, 500.0);
 /// Frames of each kind.
-const FRAMES: usize = 300;
+const FRAMES: usize = 200;
 
 /// A window without a screen.
 struct Window {
@@ -56,13 +62,15 @@ fn main() {
     );
     let mut window = Window::new(maps);
     println!("window {} x {} px, renderer: {}", WINDOW[0], WINDOW[1], window.renderer());
-    window.settle();
-    let middle = pos2(700.0, 500.0);
-    window.measure("lamp, all of it", middle, PointerButton::Primary);
-    window.measure("panning, all of it", middle, PointerButton::Secondary);
+    window.measure("opening", 40, |_| Vec::new());
+    window.drag("lamp, all of it", PointerButton::Primary, circle);
+    window.drag("panning, all of it", PointerButton::Secondary, circle);
+    window.measure("zooming", FRAMES, zoom);
     window.frame(vec![key(Key::Num1)]);
-    window.measure("panning, 1 : 1", middle, PointerButton::Secondary);
-    window.measure("lamp, 1 : 1", middle, PointerButton::Primary);
+    window.settle();
+    window.drag("panning, 1 : 1", PointerButton::Secondary, circle);
+    window.drag("lamp, 1 : 1", PointerButton::Primary, circle);
+    window.drag("across all, 1 : 1", PointerButton::Secondary, back_and_forth);
     println!("most memory of the process: {:.0} MiB", memory_mib("VmHWM"));
 }
 
@@ -117,28 +125,26 @@ impl Window {
         });
     }
 
-    /// Drags in circles, and tells what the frames took.
-    fn measure(&mut self, name: &str, middle: Pos2, button: PointerButton) {
-        self.settle();
+    /// Drags along a path, and tells what the frames took.
+    fn drag(&mut self, name: &str, button: PointerButton, path: fn(usize) -> Vec2) {
         let pressed = |pressed| Event::PointerButton {
-            pos: middle,
+            pos: MIDDLE,
             button,
             pressed,
             modifiers: Modifiers::NONE,
         };
-        self.frame(vec![Event::PointerMoved(middle), pressed(true)]);
-        let mut took: Vec<Took> = (0..FRAMES)
-            .map(|k| {
-                let angle = k as f32 * 0.05;
-                let at = middle + 300.0 * vec2(angle.cos() - 1.0, angle.sin());
-                self.frame(vec![Event::PointerMoved(at)])
-            })
-            .collect();
+        self.frame(vec![Event::PointerMoved(MIDDLE), pressed(true)]);
+        self.measure(name, FRAMES, |k| vec![Event::PointerMoved(MIDDLE + path(k))]);
         self.frame(vec![pressed(false)]);
+    }
+
+    /// Tells what so many frames took.
+    fn measure(&mut self, name: &str, frames: usize, events: fn(usize) -> Vec<Event>) {
+        let mut took: Vec<Took> = (0..frames).map(|k| self.frame(events(k))).collect();
         let mut figures = |of: fn(&Took) -> Duration| {
             took.sort_by_key(of);
             let ms = |k: usize| of(&took[k]).as_secs_f64() * 1e3;
-            (ms(FRAMES / 2), ms(FRAMES * 99 / 100), ms(FRAMES - 1))
+            (ms(frames / 2), ms(frames * 99 / 100), ms(frames - 1))
         };
         let (own, all) = (figures(|took| took.own), figures(|took| took.all));
         println!(
@@ -184,11 +190,36 @@ impl Window {
         renderer.render(&mut pass, &shapes, &screen);
         drop(pass);
         buffers.push(encoder.finish());
-        let own = started.elapsed();
         queue.submit(buffers);
+        let own = started.elapsed();
         device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         Took { own, all: started.elapsed() }
     }
+}
+
+/// Around in circles of 300 pixels.
+fn circle(k: usize) -> Vec2 {
+    let angle = k as f32 * 0.05;
+    300.0 * vec2(angle.cos() - 1.0, angle.sin())
+}
+
+/// From one end of the picture towards the other and back, 50 pixels a frame: new tiles all the time.
+fn back_and_forth(k: usize) -> Vec2 {
+    let there = (k % 100).min(100 - k % 100) as f32;
+    -50.0 * there * vec2(1.0, 0.6)
+}
+
+/// Nearer for half of the time, and back.
+fn zoom(k: usize) -> Vec<Event> {
+    let delta = if k % 100 < 50 { vec2(0.0, 20.0) } else { vec2(0.0, -20.0) };
+    let wheel = Event::MouseWheel {
+        unit: MouseWheelUnit::Point,
+        delta,
+        phase: TouchPhase::Move,
+        source: MouseWheelSource::Wheel,
+        modifiers: Modifiers::NONE,
+    };
+    vec![Event::PointerMoved(MIDDLE), wheel]
 }
 
 fn key(key: Key) -> Event {

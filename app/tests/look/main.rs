@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set its table up has failed")]
 
+mod bare;
 mod bench;
 mod pictures;
 mod shading;
+mod tiles;
 
 use bench::{Bench, SOLUTION};
 use eframe::egui::{self, Key, Modifiers, pos2};

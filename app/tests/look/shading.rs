@@ -1,10 +1,11 @@
 //! The shader against plain code: the same light, the same cloth, the same numbers.
 
+use super::bare::Bare;
 use eframe::egui;
 use egui_kittest::Harness;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use weavelight_app::rooms::look::view::{
-    Appearance, Canvas, Geometry, MapView, Maps, Mode, Viewport, install, scales, shade, sun,
+    Appearance, Geometry, MapView, Maps, Mode, Viewport, install, scales, shade, sun,
 };
 use weavelight_calibration::description::{Camera, Light, Plane, PointLight};
 
@@ -14,26 +15,6 @@ const TOLERANCE: i32 = 2;
 const SIZE: [usize; 2] = [48, 32];
 /// Points on the screen per pixel.
 const ZOOM: f32 = 8.0;
-
-/// A view and nothing else.
-struct Bare {
-    view: MapView,
-    maps: Maps,
-    appearance: Appearance,
-}
-
-impl eframe::App for Bare {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        let canvas = Canvas {
-            maps: &self.maps,
-            appearance: &self.appearance,
-            name: "cloth",
-            drag_pans: true,
-        };
-        let bare = egui::CentralPanel::default().frame(egui::Frame::new());
-        bare.show(ui, |ui| self.view.show(ui, &canvas));
-    }
-}
 
 fn normal(k: usize) -> [f32; 3] {
     let (x, y) = ((k % SIZE[0]) as f32, (k / SIZE[0]) as f32);

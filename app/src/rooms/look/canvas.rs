@@ -11,7 +11,7 @@ use crate::theme::{self, meaning};
 use crate::worker::Command;
 use eframe::egui::{
     self, Align2, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, Ui,
-    WidgetInfo, pos2, vec2,
+    Vec2, WidgetInfo, pos2, vec2,
 };
 
 /// What is being drawn, and what was drawn for the mask.
@@ -371,18 +371,23 @@ fn overlay(mask: &weavelight_calibration::description::Image<bool>, shown: &Show
         (shown.rect.width() / OVERLAY_STEP).ceil().max(1.0) as usize,
         (shown.rect.height() / OVERLAY_STEP).ceil().max(1.0) as usize,
     );
+    // The picture is not turned: columns of the screen are columns of the picture, and rows rows.
+    let at = |share: Vec2| shown.viewport.pixel_at(shown.rect.min + share, shown.rect);
+    let place = |k: usize, count: usize, length: f32| (k as f32 + 0.5) / count as f32 * length;
+    let within = |at: f64, length: usize| {
+        let at = at.round();
+        (at >= 0.0 && at < length as f64).then_some(at as usize)
+    };
+    let of_columns: Vec<Option<usize>> = (0..columns)
+        .map(|k| within(at(vec2(place(k, columns, shown.rect.width()), 0.0))[0], mask.width))
+        .collect();
     let mut pixels = Vec::with_capacity(columns * rows);
     for row in 0..rows {
-        for column in 0..columns {
-            let share = vec2(
-                (column as f32 + 0.5) / columns as f32 * shown.rect.width(),
-                (row as f32 + 0.5) / rows as f32 * shown.rect.height(),
-            );
-            let at = shown.viewport.pixel_at(shown.rect.min + share, shown.rect);
-            let left_out =
-                inside(at, [mask.width, mask.height]).is_some_and(|[x, y]| !mask.at(x, y));
-            pixels.push(if left_out { OUTSIDE } else { Color32::TRANSPARENT });
-        }
+        let y = at(vec2(0.0, place(row, rows, shown.rect.height())))[1];
+        let line = within(y, mask.height).map(|y| mask.row(y));
+        let left_out = |x: &Option<usize>| line.zip(*x).is_some_and(|(line, x)| !line[x]);
+        let color = |x| if left_out(x) { OUTSIDE } else { Color32::TRANSPARENT };
+        pixels.extend(of_columns.iter().map(color));
     }
     ColorImage::new([columns, rows], pixels)
 }

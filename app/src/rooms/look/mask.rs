@@ -1,5 +1,6 @@
 //! Painting what belongs to the swatch: brush and lasso, with every step undone and redone.
 
+use std::ops::Range;
 use std::sync::Arc;
 use weavelight_calibration::description::Image;
 
@@ -18,14 +19,8 @@ pub struct Painting {
     pub changed: bool,
 }
 
-/// A rectangle as it was before.
-#[derive(Clone, Debug)]
-struct Step {
-    left: usize,
-    top: usize,
-    width: usize,
-    before: Vec<bool>,
-}
+/// What a step turned over: runs of pixels, row by row. Turned over again it is undone.
+type Step = Vec<Range<usize>>;
 
 impl Painting {
     /// Begins with a mask, or with everything inside.
@@ -42,24 +37,41 @@ impl Painting {
 
     /// Paints along a stroke (pixel coordinates) with a round brush.
     pub fn brush(&mut self, stroke: &[[f64; 2]], radius_px: f64, inside: bool) {
-        let Some(bounds) = self.bounds(stroke, radius_px) else { return };
-        let near = |x: usize, y: usize| {
-            let at = [x as f64, y as f64];
-            distance_squared(stroke, at) <= radius_px * radius_px
-        };
-        self.paint(bounds, near, inside);
+        let mut step = Step::new();
+        let dot = stroke.first().map(|at| [*at, *at]);
+        let lines = stroke.windows(2).map(|ends| [ends[0], ends[1]]);
+        for ends in dot.into_iter().chain(lines) {
+            for y in self.rows(&ends, radius_px) {
+                if let Some(across) = capsule_across(ends, radius_px, y as f64) {
+                    self.set(y, across, inside, &mut step);
+                }
+            }
+        }
+        self.did(step);
     }
 
     /// Fills a closed line (pixel coordinates).
     pub fn lasso(&mut self, line: &[[f64; 2]], inside: bool) {
-        let Some(bounds) = self.bounds(line, 0.0).filter(|_| line.len() > 2) else { return };
-        self.paint(bounds, |x, y| is_within(line, [x as f64, y as f64]), inside);
+        let mut step = Step::new();
+        let rows = if line.len() > 2 { self.rows(line, 0.0) } else { 0..0 };
+        for y in rows {
+            let mut crossings = crossings(line, y as f64);
+            crossings.sort_by(f64::total_cmp);
+            for between in crossings.chunks_exact(2) {
+                // A pixel right on the left edge is outside, on the right edge inside, as a ray to the left says.
+                self.set(y, [between[0].floor() + 1.0, between[1]], inside, &mut step);
+            }
+        }
+        self.did(step);
     }
 
     /// Everything inside, or nothing.
     pub fn fill(&mut self, inside: bool) {
-        let bounds = [0, 0, self.mask.width, self.mask.height];
-        self.paint(bounds, |_, _| true, inside);
+        let mut step = Step::new();
+        for y in 0..self.mask.height {
+            self.set(y, [0.0, self.mask.width as f64], inside, &mut step);
+        }
+        self.did(step);
     }
 
     /// Whether something can be undone, and redone.
@@ -70,69 +82,59 @@ impl Painting {
     /// Takes the last step back.
     pub fn undo(&mut self) {
         if let Some(step) = self.done.pop() {
-            let back = self.exchange(step);
-            self.undone.push(back);
+            self.turn_over(&step);
+            self.undone.push(step);
         }
     }
 
     /// Does it again.
     pub fn redo(&mut self) {
         if let Some(step) = self.undone.pop() {
-            let back = self.exchange(step);
-            self.done.push(back);
+            self.turn_over(&step);
+            self.done.push(step);
         }
     }
 
-    /// Left, top, width and height of what a line touches; `None` outside the picture.
-    fn bounds(&self, line: &[[f64; 2]], margin: f64) -> Option<[usize; 4]> {
-        let range = |axis: usize, length: usize| {
-            let of_axis = || line.iter().map(|at| at[axis]);
-            let from = of_axis().fold(f64::INFINITY, f64::min) - margin;
-            let to = of_axis().fold(f64::NEG_INFINITY, f64::max) + margin;
-            let first = from.floor().max(0.0) as usize;
-            let end = ((to.ceil() + 1.0).max(0.0) as usize).min(length);
-            (first < end).then(|| (first, end - first))
-        };
-        let ((left, width), (top, height)) =
-            (range(0, self.mask.width)?, range(1, self.mask.height)?);
-        Some([left, top, width, height])
+    /// Rows of the picture that a line of some width touches.
+    fn rows(&self, line: &[[f64; 2]], margin: f64) -> Range<usize> {
+        let top = line.iter().map(|at| at[1]).fold(f64::INFINITY, f64::min) - margin;
+        let bottom = line.iter().map(|at| at[1]).fold(f64::NEG_INFINITY, f64::max) + margin;
+        pixels([top, bottom], self.mask.height)
     }
 
-    fn paint(
-        &mut self,
-        [left, top, width, height]: [usize; 4],
-        touched: impl Fn(usize, usize) -> bool,
-        inside: bool,
-    ) {
-        let mut before = Vec::with_capacity(width * height);
-        let mut changed = false;
-        for y in top..top + height {
-            let row = &mut self.mask.data[y * self.mask.width + left..][..width];
-            before.extend_from_slice(row);
-            for (k, pixel) in row.iter_mut().enumerate() {
-                if *pixel != inside && touched(left + k, y) {
-                    *pixel = inside;
-                    changed = true;
-                }
+    /// Sets the pixels of a row between two places and notes which ones that changes.
+    fn set(&mut self, y: usize, across: [f64; 2], inside: bool, step: &mut Step) {
+        let start = y * self.mask.width;
+        let columns = pixels(across, self.mask.width);
+        for at in start + columns.start..start + columns.end {
+            if self.mask.data[at] == inside {
+                continue;
+            }
+            self.mask.data[at] = inside;
+            match step.last_mut().filter(|run| run.end == at) {
+                Some(run) => run.end += 1,
+                None => step.push(at..at + 1),
             }
         }
-        if changed {
-            self.done.push(Step { left, top, width, before });
-            self.undone.clear();
-            if self.done.len() > MOST_STEPS {
-                self.done.remove(0);
-            }
-            self.touch();
-        }
     }
 
-    fn exchange(&mut self, mut step: Step) -> Step {
-        for (k, row) in step.before.chunks_mut(step.width).enumerate() {
-            let at = (step.top + k) * self.mask.width + step.left;
-            self.mask.data[at..at + step.width].swap_with_slice(row);
+    fn did(&mut self, step: Step) {
+        if step.is_empty() {
+            return;
+        }
+        self.done.push(step);
+        self.undone.clear();
+        if self.done.len() > MOST_STEPS {
+            self.done.remove(0);
         }
         self.touch();
-        step
+    }
+
+    fn turn_over(&mut self, step: &Step) {
+        for run in step {
+            self.mask.data[run.clone()].iter_mut().for_each(|pixel| *pixel = !*pixel);
+        }
+        self.touch();
     }
 
     fn touch(&mut self) {
@@ -141,25 +143,40 @@ impl Painting {
     }
 }
 
-/// Square of the distance from a point to a line of several points.
-fn distance_squared(line: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
-    let to_segment = |a: [f64; 2], b: [f64; 2]| {
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let along = ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy);
-        let t = if along.is_finite() { along.clamp(0.0, 1.0) } else { 0.0 };
-        (x - a[0] - t * dx).powi(2) + (y - a[1] - t * dy).powi(2)
-    };
-    let first = line.first().map_or(f64::INFINITY, |a| to_segment(*a, *a));
-    line.windows(2).map(|ends| to_segment(ends[0], ends[1])).fold(first, f64::min)
+/// Pixels from the first to the last place, both included, of a row or column of `length`.
+fn pixels([from, to]: [f64; 2], length: usize) -> Range<usize> {
+    let first = from.ceil().max(0.0) as usize;
+    let end = ((to.floor() + 1.0).max(0.0) as usize).min(length);
+    first.min(end)..end
 }
 
-/// Whether a point lies inside a closed line: a ray to the left crosses it an odd number of times.
-fn is_within(line: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+/// From where to where a thick line with round ends lies on a row: it is convex, so that the outermost places of its two
+/// discs and of the rectangle between them say it.
+fn capsule_across([a, b]: [[f64; 2]; 2], radius: f64, y: f64) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut take = |x: f64| (from, to) = (from.min(x), to.max(x));
+    for [x, centre] in [a, b] {
+        let half = (radius * radius - (y - centre) * (y - centre)).sqrt();
+        if half.is_finite() {
+            take(x - half);
+            take(x + half);
+        }
+    }
+    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+    if length > 0.0 {
+        let aside = [(a[1] - b[1]) / length * radius, (b[0] - a[0]) / length * radius];
+        let corner = |at: [f64; 2], side: f64| [at[0] + side * aside[0], at[1] + side * aside[1]];
+        let corners = [corner(a, 1.0), corner(b, 1.0), corner(b, -1.0), corner(a, -1.0)];
+        crossings(&corners, y).into_iter().for_each(take);
+    }
+    (from <= to).then_some([from, to])
+}
+
+/// Where a closed line crosses a row; an even number of places.
+fn crossings(line: &[[f64; 2]], y: f64) -> Vec<f64> {
     let next = line.iter().cycle().skip(1);
-    let crosses = line.iter().zip(next).filter(|(a, b)| {
-        (a[1] > y) != (b[1] > y) && x > a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-    });
-    crosses.count() % 2 == 1
+    let edges = line.iter().zip(next).filter(|(a, b)| (a[1] > y) != (b[1] > y));
+    edges.map(|(a, b)| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])).collect()
 }
 
 #[cfg(test)]
@@ -188,6 +205,57 @@ mod tests {
         painting.undo();
         painting.fill(true);
         assert_eq!((outside(&painting), painting.steps()), (0, [true, false]));
+    }
+
+    /// Square of the distance from a point to a line of several points: the plain meaning of the brush.
+    fn distance_squared(line: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+        let to_segment = |a: [f64; 2], b: [f64; 2]| {
+            let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+            let along = ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy);
+            let t = if along.is_finite() { along.clamp(0.0, 1.0) } else { 0.0 };
+            (x - a[0] - t * dx).powi(2) + (y - a[1] - t * dy).powi(2)
+        };
+        let first = line.first().map_or(f64::INFINITY, |a| to_segment(*a, *a));
+        line.windows(2).map(|ends| to_segment(ends[0], ends[1])).fold(first, f64::min)
+    }
+
+    /// Whether a point lies inside a closed line: a ray to the left crosses it an odd number of times. The plain meaning of the
+    /// lasso.
+    fn is_within(line: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+        let next = line.iter().cycle().skip(1);
+        let crosses = line.iter().zip(next).filter(|(a, b)| {
+            (a[1] > y) != (b[1] > y) && x > a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+        });
+        crosses.count() % 2 == 1
+    }
+
+    #[test]
+    fn rows_at_once_paint_what_pixel_by_pixel_does() {
+        let check = |name: &str, painting: &Painting, within: &dyn Fn([f64; 2]) -> bool| {
+            let width = painting.mask().width;
+            for (k, inside) in painting.mask().data.iter().enumerate() {
+                let at = [(k % width) as f64, (k / width) as f64];
+                assert_eq!(*inside, !within(at), "{name}: {at:?}");
+            }
+        };
+        for turn in 0..40 {
+            // Places that no pixel's centre lies on, some of them outside; and one line that folds back.
+            let place = |k: usize| {
+                let spread = |step: f64, length: f64| {
+                    ((turn * 8 + k) as f64 * step).fract() * (length + 20.37) - 10.13
+                };
+                [spread(0.618_034, 60.0), spread(0.754_878, 45.0)]
+            };
+            let line: Vec<[f64; 2]> = (0..turn % 7).map(place).chain([place(0)]).collect();
+            let radius = 0.3 + turn as f64 * 0.27;
+            let name = format!("{line:?}, radius {radius}");
+            let mut painting = Painting::new([60, 45], None);
+            painting.brush(&line, radius, false);
+            check(&name, &painting, &|at| distance_squared(&line, at) <= radius * radius);
+            let mut painting = Painting::new([60, 45], None);
+            painting.lasso(&line, false);
+            check(&name, &painting, &|at| line.len() > 2 && is_within(&line, at));
+        }
     }
 
     #[test]

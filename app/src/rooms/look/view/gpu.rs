@@ -11,9 +11,12 @@ use eframe::egui_wgpu::wgpu::{self, util::DeviceExt};
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, RenderState, ScreenDescriptor};
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-/// Tiles sent to the card in one frame, all pictures together: some two milliseconds.
+/// Most tiles sent to the card in one frame, all pictures together.
 const TILES_PER_FRAME: usize = 8;
+/// Time after which a frame sends no further tile, so that slow memory costs sharpness for a moment and not a frame.
+const SENDING: Duration = Duration::from_millis(2);
 /// Frames after which a view that is not drawn lets go of its tiles.
 const FORGOTTEN: u64 = 600;
 /// Pictures that a view draws from: surface, albedo, and one for each side.
@@ -94,38 +97,71 @@ impl Frame {
         ]
     }
 
-    /// Brings what is seen to the card, a few tiles a frame; true where some are still missing.
+    /// Brings what is seen to the card, a few tiles a frame, coarser ones standing in for the rest; true where some are still
+    /// missing.
     fn upload(&self, gpu: &mut Gpu, device: &wgpu::Device, queue: &wgpu::Queue) -> bool {
         let Some(surface) = &self.pictures[0] else { return false };
         let now = gpu.now;
         let view = gpu.views.entry(self.id).or_insert_with(|| OnCard::new(device));
         view.drawn = now;
-        let places = self.viewport.tiles(surface, self.screen.0, self.screen.1);
-        let mut left = TILES_PER_FRAME;
-        let mut missing = false;
+        let (screen, pixels_per_point) = self.screen;
+        let places = self.viewport.tiles(surface, screen, pixels_per_point);
+        let room = Viewport::most_tiles(surface, screen, pixels_per_point);
         for (pool, picture) in view.pools.iter_mut().zip(&self.pictures) {
-            let Some(picture) = picture else { continue };
-            if pool.reserve(device, places.len() + 1) {
+            if picture.is_some() && pool.reserve(device, room) {
                 view.bound = None;
             }
-            // The coarsest tile first: there is always something to see.
-            let whole = Place { level: picture.coarsest(), x: 0, y: 0 };
-            for place in std::iter::once(whole).chain(places.iter().copied()) {
-                if pool.holds(picture, place, now) {
-                    continue;
-                }
-                let urgent = place == whole;
-                if left == 0 && !urgent {
-                    missing = true;
-                } else if pool.put(queue, picture, place, now, &mut gpu.texels) {
-                    left = left.saturating_sub(1);
-                }
-            }
         }
+        let missing = self.missing(view, &places, now);
+        let sent = self.send_some(view, queue, &missing, &mut gpu.texels, now);
         let instances: Vec<Instance> =
             places.iter().map(|place| self.instance(view, surface, *place, now)).collect();
         view.send(device, queue, &self.uniform, &instances);
+        sent < missing.len()
+    }
+
+    /// Which pictures lack which tiles: the coarsest first, so that there is always something to see, then from the middle of
+    /// the screen outwards. Those that are there count as seen.
+    fn missing(&self, view: &mut OnCard, places: &[Place], now: u64) -> Vec<(usize, Place)> {
+        let mut missing = Vec::new();
+        for (role, (pool, picture)) in view.pools.iter_mut().zip(&self.pictures).enumerate() {
+            let Some(picture) = picture else { continue };
+            let wanted = std::iter::once(whole(picture)).chain(places.iter().copied());
+            let lacking = wanted.filter(|place| !pool.holds(picture, *place, now));
+            missing.extend(lacking.map(|place| (role, place)));
+        }
+        missing.sort_by_key(|(_, place)| (std::cmp::Reverse(place.level), self.off_centre(*place)));
+        missing.dedup();
         missing
+    }
+
+    /// How far a tile's middle is from the screen's, pixels.
+    fn off_centre(&self, place: Place) -> u64 {
+        let side = (TILE << place.level) as f64;
+        let away = |at: usize, centre: f64| (at as f64 + 0.5) * side - centre;
+        let [x, y] = self.viewport.centre;
+        away(place.x, x).hypot(away(place.y, y)) as u64
+    }
+
+    /// Sends the first of the tiles, as many as a frame may take; how many that were.
+    fn send_some(
+        &self,
+        view: &mut OnCard,
+        queue: &wgpu::Queue,
+        missing: &[(usize, Place)],
+        texels: &mut Vec<Texel>,
+        now: u64,
+    ) -> usize {
+        let started = Instant::now();
+        for (sent, (role, place)) in missing.iter().enumerate() {
+            let Some(picture) = &self.pictures[*role] else { continue };
+            let enough = sent >= TILES_PER_FRAME || (sent > 0 && started.elapsed() > SENDING);
+            if enough && *place != whole(picture) {
+                return sent;
+            }
+            view.pools[*role].put(queue, picture, *place, now, texels);
+        }
+        missing.len()
     }
 
     fn instance(&self, view: &mut OnCard, picture: &Pyramid, place: Place, now: u64) -> Instance {
@@ -147,6 +183,11 @@ impl Frame {
         }
         instance
     }
+}
+
+/// The tile that shows all of a picture.
+fn whole(picture: &Pyramid) -> Place {
+    Place { level: picture.coarsest(), x: 0, y: 0 }
 }
 
 impl CallbackTrait for Frame {

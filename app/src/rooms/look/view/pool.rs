@@ -7,9 +7,9 @@ use std::sync::{Arc, Weak};
 
 /// Bytes of a tile on the card.
 pub const TILE_BYTES: usize = SLOT * SLOT * size_of::<Texel>();
-/// Fewest tiles that a pool holds.
-const FEWEST: usize = 48;
-/// Most: what every card offers as layers of one texture.
+/// A pool grows by so many tiles, lest a window that is being enlarged asks for a new one every frame.
+const STEP: usize = 32;
+/// Most tiles that a pool holds: what every card offers as layers of one texture.
 const MOST: usize = 256;
 
 /// A texture of many layers, each a tile.
@@ -43,13 +43,12 @@ impl Pool {
         Self { texture: texture(device, 1), slots: Vec::new(), index: HashMap::new() }
     }
 
-    /// Makes room for `wanted` tiles at once. True where the texture is another one now.
+    /// Makes room for `wanted` tiles at once. True where the texture is another, empty one now.
     pub(super) fn reserve(&mut self, device: &wgpu::Device, wanted: usize) -> bool {
-        let wanted = (wanted + wanted / 4).clamp(FEWEST, MOST);
-        if wanted <= self.capacity() {
+        if wanted.min(MOST) <= self.capacity() {
             return false;
         }
-        let capacity = wanted.next_multiple_of(FEWEST).min(MOST);
+        let capacity = wanted.next_multiple_of(STEP).min(MOST);
         *self = Self { texture: texture(device, capacity), ..Self::empty(device) };
         true
     }
@@ -88,7 +87,7 @@ impl Pool {
         })
     }
 
-    /// Puts a tile there. False where everything is being seen.
+    /// Puts a tile there; nothing where all that is there is being seen.
     pub(super) fn put(
         &mut self,
         queue: &wgpu::Queue,
@@ -96,8 +95,8 @@ impl Pool {
         place: Place,
         now: u64,
         texels: &mut Vec<Texel>,
-    ) -> bool {
-        let Some(layer) = self.layer_to_fill(now) else { return false };
+    ) {
+        let Some(layer) = self.layer_to_fill(now) else { return };
         picture.cut(place, texels);
         let side = SLOT as u32;
         queue.write_texture(
@@ -125,7 +124,6 @@ impl Pool {
             false => self.slots.push(slot),
         }
         self.index.insert(key, layer);
-        true
     }
 
     fn layer_to_fill(&self, now: u64) -> Option<usize> {

@@ -84,6 +84,19 @@ impl Viewport {
         }
     }
 
+    /// Most tiles that [`Viewport::tiles`] can ask for at any place and zoom, and the one that shows all of the picture: what a
+    /// view makes room for once, so that zooming never empties it.
+    pub(super) fn most_tiles(pyramid: &Pyramid, screen: Vec2, pixels_per_point: f32) -> usize {
+        // The level is the nearest one, so that its texels are at least 1 / sqrt 2 of a pixel wide.
+        let across = |points: f32| {
+            let texels = f64::from(points * pixels_per_point) * std::f64::consts::SQRT_2;
+            (texels / TILE as f64).ceil().max(0.0) as usize + 1
+        };
+        let of_screen = across(screen.x).saturating_mul(across(screen.y)).min(MOST_TILES);
+        let of_level = |level| pyramid.tiles(level).iter().product::<usize>();
+        of_screen.min(of_level(0)) + 1
+    }
+
     fn tiles_of(&self, pyramid: &Pyramid, screen: Vec2, level: usize) -> Vec<Place> {
         let seen = self.seen(screen);
         let side = (TILE << level) as f32;
@@ -135,5 +148,25 @@ mod tests {
         check(64.0, 0, 1);
         check(0.4, 1, 4 * 2);
         check(0.01, 3, 1);
+    }
+
+    #[test]
+    fn there_is_room_for_every_place_and_zoom() {
+        let check = |size: [usize; 2], screen: Vec2, pixels_per_point: f32| {
+            let pyramid = Pyramid::new(size, &|_, _| [0.0; 4], |_| [f16::ZERO; 4]);
+            let room = Viewport::most_tiles(&pyramid, screen, pixels_per_point);
+            let mut most = 0;
+            for k in 0..400 {
+                let zoom = 0.05 * 1.02_f32.powi(k);
+                let place = |axis: usize| (k as usize * 7919 % size[axis]) as f64;
+                let viewport = Viewport { centre: [place(0), place(1)], zoom };
+                most = most.max(viewport.tiles(&pyramid, screen, pixels_per_point).len());
+            }
+            assert!(most < room && room <= 2 * most + 1, "{size:?}: {most} tiles, room for {room}");
+        };
+        check([3000, 2000], vec2(800.0, 600.0), 1.0);
+        check([3000, 2000], vec2(800.0, 600.0), 1.5);
+        check([3000, 2000], vec2(8000.0, 6000.0), 2.0);
+        check([144, 96], vec2(800.0, 600.0), 1.0);
     }
 }

@@ -1,0 +1,24 @@
+//! A view and nothing else.
+
+use eframe::egui;
+use weavelight_app::rooms::look::view::{Appearance, Canvas, MapView, Maps};
+
+/// The view.
+pub(crate) struct Bare {
+    pub(crate) view: MapView,
+    pub(crate) maps: Maps,
+    pub(crate) appearance: Appearance,
+}
+
+impl eframe::App for Bare {
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let canvas = Canvas {
+            maps: &self.maps,
+            appearance: &self.appearance,
+            name: "cloth",
+            drag_pans: true,
+        };
+        let bare = egui::CentralPanel::default().frame(egui::Frame::new());
+        bare.show(ui, |ui| self.view.show(ui, &canvas));
+    }
+}
