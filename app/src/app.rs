@@ -135,6 +135,9 @@ impl App {
         if self.shown == Some(Room::Rig) {
             self.rig.leave(&mut self.desk);
         }
+        if self.shown == Some(Room::Calibrate) {
+            self.calibrate.leave();
+        }
         if open == Some(Room::Scans) {
             self.scans.is_stale();
         }

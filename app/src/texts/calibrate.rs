@@ -8,9 +8,9 @@ pub const TAKE: &str = "Take the picture (Space)";
 /// The button that fits where that did not happen by itself.
 pub const FIT: &str = "Calculate (Space)";
 /// The button that takes a test shot.
-pub const LOOK: &str = "Look first";
+pub const LOOK: &str = "Live";
 /// What that does.
-pub const LOOK_HINT: &str = "A test shot with what is found in it drawn over it; nothing is kept";
+pub const LOOK_HINT: &str = "Looks again and again, with what is found drawn over the picture, until it is switched off; nothing is kept";
 /// The button that goes on by itself.
 pub const AUTO: &str = "Do the rest by itself";
 /// What that does.

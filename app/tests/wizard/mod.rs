@@ -90,6 +90,14 @@ fn the_wizard_goes_to_a_finished_calibration() {
     looks(&mut window, "calibrate-start", &mut results);
     check_names(&window);
 
+    // Live: the board is drawn over the picture as it is moved about, again and again, and nothing is kept.
+    window.click("Live");
+    window.until_label("The board is found: 54 corners.");
+    window.until("it looks again", |app| app.desk().is_busy());
+    window.click("Live");
+    window.idle();
+    assert!(!window.rig().join("targets").exists());
+
     // The first picture by hand: Space, as on the bench.
     window.harness.key_press(egui::Key::Space);
     window.harness.step();

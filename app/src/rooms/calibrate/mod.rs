@@ -79,6 +79,7 @@ pub struct Calibrate {
     asked: bool,
     /// Go on by itself, on the simulated rig.
     auto: bool,
+    live: Live,
     browse: Browse,
     view: view::View,
     /// What came of camera, colour, lights and check.
@@ -89,6 +90,16 @@ pub struct Calibrate {
     trouble: Option<String>,
     /// Where the last thing went that was put away.
     kept: Option<PathBuf>,
+}
+
+/// One look after the other, while somebody moves a board about.
+#[derive(Debug, Default)]
+struct Live {
+    on: bool,
+    /// A look was asked for and has not come yet.
+    awaited: bool,
+    /// So was a picture that is kept.
+    taking: bool,
 }
 
 impl Calibrate {
@@ -191,18 +202,21 @@ impl Calibrate {
         ui.horizontal(|ui| {
             let text = if is_fit { texts::FIT } else { texts::TAKE };
             let size = egui::vec2(220.0, theme::BIG);
-            let clicked = crate::widgets::primary(ui, text, size, !busy).clicked();
+            // While it looks, the picture that is wanted comes right after.
+            let free_to_go = !busy || (self.live.on && !self.live.taking);
+            let clicked = crate::widgets::primary(ui, text, size, free_to_go).clicked();
             let free = !ui.ctx().egui_wants_keyboard_input();
             let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
-            if (clicked || space) && !busy {
+            if (clicked || space) && free_to_go {
                 self.go(task, desk);
             }
             let small = egui::vec2(0.0, theme::BIG);
             if !is_fit {
-                let look = egui::Button::new(texts::LOOK).min_size(small);
-                if ui.add_enabled(!busy, look).on_hover_text(texts::LOOK_HINT).clicked() {
-                    let targets = desk.settings.targets.clone();
-                    self.ask(Ask::Look(task, targets), desk);
+                let look = egui::Button::selectable(self.live.on, texts::LOOK).min_size(small);
+                let look = look.frame_when_inactive(true);
+                if ui.add_enabled(free_to_go, look).on_hover_text(texts::LOOK_HINT).clicked() {
+                    self.live.on = !self.live.on;
+                    self.look(desk);
                 }
             }
             if self.checking && ui.add_enabled(!busy, not_now(small)).clicked() {
@@ -222,12 +236,27 @@ impl Calibrate {
         });
     }
 
+    /// The next look, where they are wanted and none is on its way.
+    fn look(&mut self, desk: &mut Desk) {
+        let task = self.wanted().filter(|task| !matches!(task, Task::Fit(_) | Task::Done));
+        if let Some(task) = task.filter(|_| self.live.on && !self.live.awaited) {
+            self.live.awaited = true;
+            desk.ask(Command::Calibrate(Ask::Look(task, desk.settings.targets.clone())));
+        }
+    }
+
+    /// Nobody sees the pictures any more.
+    pub fn leave(&mut self) {
+        self.live.on = false;
+    }
+
     fn go(&mut self, task: Task, desk: &mut Desk) {
         let ask = match task {
             Task::Done => return,
             Task::Fit(step) => Ask::Fit(step),
             task => Ask::Take(task, desk.settings.targets.clone()),
         };
+        self.live.taking = true;
         self.ask(ask, desk);
     }
 
@@ -239,13 +268,19 @@ impl Calibrate {
                 desk.calibration_age_days = state.age_days;
                 self.checking &= state.passed.is_none() && task == Task::Done;
                 self.state = Some(state);
+                self.live.taking = false;
                 match (self.auto, task) {
                     (true, Task::Done | Task::Fit(_)) => self.auto = false,
                     (true, task) => self.go(task, desk),
-                    (false, _) => {}
+                    (false, _) => self.look(desk),
                 }
             }
-            Told::Picture(picture) => self.view.show(*picture),
+            Told::Picture(picture) => {
+                self.view.show(*picture);
+                if std::mem::take(&mut self.live.awaited) {
+                    self.look(desk);
+                }
+            }
             Told::Report(report) => {
                 let (step, text) = figures::text(&report);
                 self.figures[step as usize] = Some(text);
@@ -253,6 +288,7 @@ impl Calibrate {
             Told::Kept(folder) => self.kept = Some(folder),
             Told::Halted(ended) => {
                 self.auto = false;
+                self.live = Live::default();
                 // The error was put up just before.
                 let newest = desk.problems.iter().rev().find(|it| it.severity == Severity::Error);
                 let newest = newest.filter(|_| ended == Ended::Failed);
