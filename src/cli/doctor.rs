@@ -3,7 +3,7 @@
 use super::output::{Failure, Output};
 use crate::device::board::PortChoice;
 use crate::device::scan::{CameraFinding, diagnose_camera};
-use crate::doctor::{Examination, LightBoard, SerialPort, examine, examine_boards};
+use crate::doctor::{Examination, Graphics, LightBoard, SerialPort, examine, examine_boards};
 use crate::instrument::Rig;
 use serde_json::json;
 use std::path::PathBuf;
@@ -38,6 +38,7 @@ fn text(found: &Examination, boards: &[LightBoard], cameras: &[CameraFinding]) -
         format!("program    {}", found.program),
         format!("boards     {}", chessboards(found)),
         format!("machine    {} cores, {}", found.cores, memory(found)),
+        format!("graphics   {}", graphics(&found.graphics)),
         format!("folder     {}", folder(found)),
     ];
     if found.serial_ports.is_empty() {
@@ -60,6 +61,19 @@ fn chessboards(found: &Examination) -> &'static str {
         "chessboard detection built in"
     } else {
         "no chessboard detection; build with --features opencv"
+    }
+}
+
+fn graphics(found: &Graphics) -> String {
+    match (&found.adapter, &found.problem) {
+        (Some(adapter), _) if adapter.software => {
+            format!(
+                "{} ({}), in software: `solve` uses it only where it measures faster",
+                adapter.name, adapter.driver
+            )
+        }
+        (Some(adapter), _) => format!("{} ({})", adapter.name, adapter.driver),
+        (None, problem) => problem.clone().unwrap_or_default(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! What of the machine and the instrument is there and usable, without touching any of it.
 
 use crate::device::board::{BoardError, Identity, PortChoice, PortFinding, diagnose};
+use crate::gpu::{Adapter, Gpu};
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,6 +13,8 @@ pub struct Examination {
     pub program: &'static str,
     /// Whether chessboard detection is built in.
     pub opencv: bool,
+    /// The graphics processor that `solve --device` could use.
+    pub graphics: Graphics,
     /// Cores that this process may use.
     pub cores: usize,
     /// Memory that can be had without swapping; `None` where the system does not say.
@@ -24,6 +27,15 @@ pub struct Examination {
     pub free_space_mb: Option<u64>,
     /// Serial ports that may belong to a light controller.
     pub serial_ports: Vec<SerialPort>,
+}
+
+/// A graphics processor, or why there is none.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Graphics {
+    /// What was found.
+    pub adapter: Option<Adapter>,
+    /// What is wrong and what to do; `None` where all is well.
+    pub problem: Option<String>,
 }
 
 /// A serial port.
@@ -77,6 +89,7 @@ pub fn examine(folder: &Path) -> Examination {
     Examination {
         program: crate::files::PROGRAM,
         opencv: cfg!(feature = "opencv"),
+        graphics: graphics(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
         available_memory_mb: fs::read_to_string("/proc/meminfo")
             .ok()
@@ -86,6 +99,15 @@ pub fn examine(folder: &Path) -> Examination {
         write_error: tempfile::tempfile_in(folder).err().map(|error| error.to_string()),
         free_space_mb: crate::files::free_bytes(folder).map(|bytes| bytes >> 20),
         serial_ports: serial_ports(Path::new("/dev")),
+    }
+}
+
+/// Opens it as a solve would.
+fn graphics() -> Graphics {
+    let opened = Gpu::open();
+    Graphics {
+        problem: opened.as_ref().err().map(ToString::to_string),
+        adapter: opened.ok().map(|gpu| gpu.adapter().clone()),
     }
 }
 
