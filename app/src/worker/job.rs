@@ -141,6 +141,10 @@ impl Outbox {
         let control = Control::default();
         let put = |value| self.brake.0.scan.lock().map(|mut scan| *scan = value);
         let _ = put(Some(control.clone()));
+        // Stopped before there was a scan to stop.
+        if self.brake.is_cancelled() {
+            control.stop();
+        }
         let result = work(&control);
         let _ = put(None);
         result
@@ -173,6 +177,15 @@ mod tests {
         });
         assert_eq!((result, steps), (Err(Ended::Cancelled), 4));
         assert!(matches!(updates.try_iter().last(), Some(Update::Ended)));
+    }
+
+    #[test]
+    fn a_scan_that_was_stopped_before_it_began_does_not_begin() {
+        let (out, _updates) = outbox();
+        out.brake.cancel();
+        assert!(out.with_control(Control::is_stopped));
+        out.begin();
+        assert!(!out.with_control(Control::is_stopped));
     }
 
     #[test]

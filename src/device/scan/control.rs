@@ -29,6 +29,11 @@ impl Control {
         self.0.store(2, Ordering::SeqCst);
     }
 
+    /// Whether it was told to stop.
+    pub fn is_stopped(&self) -> bool {
+        self.wish() == Wish::Stop
+    }
+
     pub(super) fn wish(&self) -> Wish {
         match self.0.load(Ordering::SeqCst) {
             0 => Wish::GoOn,
