@@ -133,7 +133,7 @@ pub mod rig {
     pub const CLICK_A_LIGHT: &str =
         "Click a light to switch it on; click it again to switch it off.";
     /// Of the table.
-    pub const COLUMNS: [&str; 4] = ["Light", "Output", "Measured with a ruler", "Calibrated"];
+    pub const COLUMNS: [&str; 4] = ["Light", "Output", "By the ruler, mm", "Calibrated, mm"];
     /// In place of a place.
     pub const FAR: &str = "far away";
 
@@ -162,14 +162,14 @@ pub mod rig {
 
     /// A place, millimetres.
     pub fn place([x, y, z]: [f64; 3]) -> String {
-        format!("{x:.0}, {y:.0}, {z:.0} mm")
+        format!("{x:.0}, {y:.0}, {z:.0}")
     }
 
     /// A calibrated place, if there is one.
     pub fn calibrated(place_mm: Option<[f64; 3]>, sigma_mm: Option<f64>) -> String {
         match (place_mm, sigma_mm) {
-            (Some([x, y, z]), Some(sigma)) => format!("{x:.1}, {y:.1}, {z:.1} ± {sigma:.1} mm"),
-            (Some([x, y, z]), None) => format!("{x:.1}, {y:.1}, {z:.1} mm"),
+            (Some([x, y, z]), Some(sigma)) => format!("{x:.1}, {y:.1}, {z:.1} ± {sigma:.1}"),
+            (Some([x, y, z]), None) => format!("{x:.1}, {y:.1}, {z:.1}"),
             (None, _) => "not yet".to_owned(),
         }
     }

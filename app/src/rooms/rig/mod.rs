@@ -153,7 +153,7 @@ impl Rig {
     /// The same as a table. The light whose button was clicked.
     fn table(&self, ui: &mut egui::Ui, lamps: &[Lamp]) -> Option<usize> {
         let mut clicked = None;
-        egui::Grid::new("lights").striped(true).num_columns(4).min_col_width(90.0).show(ui, |ui| {
+        egui::Grid::new("lights").striped(true).num_columns(4).min_col_width(80.0).show(ui, |ui| {
             texts::COLUMNS.iter().for_each(|column| {
                 ui.label(RichText::new(*column).strong());
             });
