@@ -77,7 +77,8 @@ impl App {
         self.worker.is_idle() && !self.desk.is_busy() && !self.desk.has_asked()
     }
 
-    fn hear(&mut self, update: Update) {
+    /// Takes in what the worker tells.
+    pub fn hear(&mut self, update: Update) {
         let desk = &mut self.desk;
         match update {
             Update::Began(title) => desk.activity = Some(Activity::new(title)),

@@ -28,7 +28,7 @@ pub const AGAIN: &str = "Again";
 pub const AGAIN_HINT: &str =
     "Take the pictures of this step again; those there are go into the folder “history” of the rig";
 /// The button that begins a check.
-pub const CHECK: &str = "Check";
+pub const CHECK: &str = "Check now";
 /// What that does.
 pub const CHECK_HINT: &str = "Photograph a tilted sheet that the calibration has not seen";
 /// The button that leaves the check for another day.
@@ -73,6 +73,8 @@ pub const PUTTING_AWAY: &str = "Putting what is there into the history";
 /// Where there is nothing.
 pub const NO_HISTORY: &str =
     "Empty. Earlier calibrations, and pictures that are taken again, are kept here.";
+/// The button that leads on.
+pub const SCAN: &str = "Go and scan";
 /// While pictures are looked at.
 pub const LOOKING: &str = "Looking at the pictures";
 /// While a test shot is taken.

@@ -6,6 +6,8 @@
     reason = "a test that cannot go on panics; figures are to be seen"
 )]
 
+mod troubles;
+
 use crate::desk::{self, Window};
 use eframe::egui;
 #[cfg(feature = "opencv")]
@@ -22,9 +24,15 @@ const FRAME: [usize; 2] = [410, 272];
 /// A window with a rig that nobody has calibrated yet: its ruler errs, its lens darkens towards the corners.
 fn uncalibrated(size: [f32; 2]) -> Window {
     let mut window = Window::new(size, egui::Theme::Dark);
+    make_uncalibrated(&mut window, FRAME);
+    window
+}
+
+/// Makes such a rig with frames of that size, and opens it in the Calibrate room.
+fn make_uncalibrated(window: &mut Window, frame: [usize; 2]) {
     let mut options = simulate::Options {
         out: window.rig(),
-        size_px: Some(FRAME),
+        size_px: Some(frame),
         ..simulate::Options::default()
     };
     options.flaws.ruler_error_mm = 8.0;
@@ -35,7 +43,6 @@ fn uncalibrated(size: [f32; 2]) -> Window {
     window.idle();
     window.enter(Room::Calibrate);
     window.idle();
-    window
 }
 
 /// How the window looks now, at two sizes and in both themes.
@@ -134,6 +141,23 @@ fn the_wizard_goes_to_a_finished_calibration() {
     looks(&mut window, "calibrate-done", &mut results);
     check_names(&window);
     check_against_truth(&window);
+
+    // Again, and back: the pictures are put away and lose nothing.
+    window.click("Lights: take the pictures again");
+    window.until_label("Lay the white sheet on the table");
+    window.idle();
+    assert!(!window.rig().join("targets/white-flat").exists());
+    let kept: Vec<_> = std::fs::read_dir(window.rig().join("history")).unwrap().flatten().collect();
+    let [kept] = kept.as_slice() else { panic!("{kept:?}") };
+    let name = kept.file_name().into_string().unwrap();
+    assert!(name.starts_with("pictures-lights-"), "{name}");
+    assert!(kept.path().join("white-flat/session.toml").exists());
+    let said = format!("What was there before is kept in the rig's folder, under history/{name}.");
+    window.until_label(&said);
+    window.harness.get_by_label_contains("Put back, Lights").click();
+    window.harness.step();
+    window.until_label("The rig is calibrated");
+    window.idle();
 
     // Anew: the old one stays in use, and lies in the history.
     window.click("Calibrate anew");

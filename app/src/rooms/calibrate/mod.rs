@@ -7,12 +7,14 @@ mod foresee;
 mod history;
 mod picture;
 mod task;
+mod verdict;
 mod view;
 mod work;
 
 pub use history::{Entry, Kept};
 pub use picture::{Marks, Picture};
 pub use task::{BOARDS, Pose, State, Step, TargetSettings, Task};
+pub use verdict::Verdict;
 pub use work::Memory;
 
 use crate::browse::Browse;
@@ -115,14 +117,16 @@ impl Calibrate {
         });
         let task = self.wanted();
         if let (Some(task), Some(state)) = (task, &self.state)
-            && let Some(draw) = coverage::of(task)
+            && let Some(draw) = coverage::of(task).filter(|_| can(task, state))
         {
             let panel = egui::Panel::bottom("coverage").exact_size(coverage::HEIGHT);
             panel.show(ui, |ui| draw(ui, state));
         }
         egui::CentralPanel::default().show(ui, |ui| {
             if let Some(task) = task {
-                self.task(ui, task, desk);
+                if !self.task(ui, task, desk) {
+                    return;
+                }
                 let corners = self.state.as_ref().filter(|_| task == Task::Board);
                 self.view.ui(ui, corners.map_or(&[], |state| &state.corners_px));
             }
@@ -152,7 +156,7 @@ impl Calibrate {
             let figures = self.figures[step as usize].as_deref();
             if view::step(ui, state, step, now, figures) && free {
                 self.checking = step == Step::Check;
-                wanted = Some(Ask::Again(step));
+                wanted = (state.share(step) > 0.0).then_some(Ask::Again(step));
             }
         }
         ui.separator();
@@ -169,24 +173,22 @@ impl Calibrate {
         }
     }
 
-    /// What to do now, and the button that does it.
-    fn task(&mut self, ui: &mut egui::Ui, task: Task, desk: &mut Desk) {
-        let Some(state) = &self.state else { return };
+    /// What to do now, and the button that does it. Whether there is a picture to come.
+    fn task(&mut self, ui: &mut egui::Ui, task: Task, desk: &mut Desk) -> bool {
+        let Some(state) = &self.state else { return false };
         let simulated = desk.place.as_ref().is_some_and(view::lays_by_itself);
         view::instructions(ui, task, state, simulated);
         view::told(ui, self.trouble.as_deref(), self.kept.as_deref());
         if task == Task::Done {
-            view::verdict(ui, state);
-            let size = egui::vec2(220.0, theme::BIG);
-            if crate::widgets::primary(ui, texts::GO_SCAN, size, true).clicked() {
+            let is_old = desk.expired_days().is_some();
+            if view::verdict(ui, state, is_old) {
                 desk.go_to(Room::Scan);
             }
-            ui.add_space(theme::GAP);
-            return;
+            return self.view.has_picture();
         }
-        if !state.sees_chessboards && task.step() == Some(Step::Camera) {
+        if !can(task, state) {
             view::no_chessboards(ui);
-            return;
+            return false;
         }
         if !simulated {
             let targets = &mut desk.settings.targets;
@@ -194,6 +196,7 @@ impl Calibrate {
         }
         self.buttons(ui, task, simulated, desk);
         ui.add_space(theme::GAP);
+        true
     }
 
     fn buttons(&mut self, ui: &mut egui::Ui, task: Task, simulated: bool, desk: &mut Desk) {
@@ -266,7 +269,7 @@ impl Calibrate {
             Told::State(state) => {
                 let task = state.next();
                 desk.calibration_age_days = state.age_days;
-                self.checking &= state.passed.is_none() && task == Task::Done;
+                self.checking &= state.verdict.is_none() && task == Task::Done;
                 self.state = Some(state);
                 self.live.taking = false;
                 match (self.auto, task) {
@@ -301,6 +304,11 @@ impl Calibrate {
     pub fn reset(&mut self) {
         *self = Self::default();
     }
+}
+
+/// Whether this build can do it.
+fn can(task: Task, state: &State) -> bool {
+    state.sees_chessboards || task.step() != Some(Step::Camera)
 }
 
 fn not_now(size: egui::Vec2) -> egui::Button<'static> {

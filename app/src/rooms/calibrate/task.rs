@@ -1,6 +1,7 @@
 //! What is to be done next, as a function of what is there.
 
 use super::history::Entry;
+use super::verdict::Verdict;
 use serde::{Deserialize, Serialize};
 use weavelight::calibrate::{BoardsSoFar, Foreseen, Status, StepState};
 
@@ -131,8 +132,8 @@ pub struct State {
     pub foreseen: Option<Foreseen>,
     /// Which of camera, colour and lights were made from what lies in `targets` now.
     pub fresh: [bool; 3],
-    /// Whether the check passed; `None` before it.
-    pub passed: Option<bool>,
+    /// What came of the check; `None` before it.
+    pub verdict: Option<Verdict>,
     /// Days since the oldest part was made.
     pub age_days: Option<i64>,
     /// Earlier calibrations and pictures, the newest first.
@@ -167,7 +168,7 @@ impl State {
         if !self.fresh[2] {
             return Task::Fit(Step::Lights);
         }
-        match (self.sheets.contains(&Pose::Check), self.passed) {
+        match (self.sheets.contains(&Pose::Check), &self.verdict) {
             (false, _) => Task::Sheet(Pose::Check),
             (true, None) => Task::Fit(Step::Check),
             (true, Some(_)) => Task::Done,
@@ -182,7 +183,7 @@ impl State {
             Step::Camera => share(self.boards[1], BOARDS),
             Step::Color => share(usize::from(self.chart), 1),
             Step::Lights => share(sheets, Pose::FIT.len()),
-            Step::Check => share(usize::from(self.passed.is_some()), 1),
+            Step::Check => share(usize::from(self.verdict.is_some()), 1),
         }
     }
 
@@ -259,7 +260,7 @@ mod tests {
             sheets: Vec::new(),
             foreseen: None,
             fresh: [false; 3],
-            passed: None,
+            verdict: None,
             age_days: None,
             history: Vec::new(),
             sees_chessboards: true,
@@ -291,7 +292,8 @@ mod tests {
         check(&state, Task::Sheet(Pose::Check));
         state.sheets.push(Pose::Check);
         check(&state, Task::Fit(Step::Check));
-        state.passed = Some(false);
+        let kept = "schema = 1\nlights_sha256 = \"\"\npassed = false\nslope_rms_deg = 0.3\nlimit_deg = 0.1";
+        state.verdict = Some(toml::from_str(kept).unwrap());
         check(&state, Task::Done);
         // A board that is photographed once more makes everything after it stale.
         state.fresh = [false; 3];

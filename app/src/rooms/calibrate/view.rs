@@ -10,7 +10,7 @@ use crate::theme::{self, meaning};
 use crate::widgets::Sign;
 use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
 use std::path::Path;
-use weavelight::calibrate::StepState;
+use weavelight::calibrate::{Action, StepState};
 use weavelight::instrument::CameraKind;
 
 /// The picture that was taken last.
@@ -28,6 +28,11 @@ impl std::fmt::Debug for View {
 impl View {
     pub(super) fn show(&mut self, picture: Picture) {
         self.picture = Some((picture, None));
+    }
+
+    /// Whether one was taken since the rig was opened.
+    pub(super) fn has_picture(&self) -> bool {
+        self.picture.is_some()
     }
 
     /// The picture as large as there is room, with what was found; `earlier`: corners of the pictures before it.
@@ -106,7 +111,13 @@ pub(super) fn step(
                 .steps
                 .get(step as usize)
                 .filter(|step| step.state != StepState::Missing);
-            let text = figures.map(str::to_owned).or(quality.map(|step| step.quality.clone()));
+            let check = state.verdict.as_ref().filter(|_| step == Step::Check);
+            let text =
+                figures
+                    .map(str::to_owned)
+                    .or(quality.map(|step| step.quality.clone()))
+                    .or(check
+                        .map(|it| texts::check_figures(it.passed, it.slope_rms_deg, it.limit_deg)));
             let text = text.unwrap_or_else(|| texts::what(step).to_owned());
             ui.add(egui::Label::new(RichText::new(text).weak()).wrap());
             if is_now && state.share(step) > 0.0 && state.share(step) < 1.0 {
@@ -121,11 +132,7 @@ pub(super) fn step(
 fn mark(ui: &mut egui::Ui, state: &State, step: Step) {
     let of_status = state.status.steps.get(step as usize).map(|step| step.state);
     let sign = match (step, of_status) {
-        (Step::Check, _) => match state.passed {
-            Some(true) => Some(Sign::Good),
-            Some(false) => Some(Sign::Bad),
-            None => None,
-        },
+        (Step::Check, _) => state.verdict.as_ref().map(|verdict| sign(verdict.passed)),
         (_, Some(StepState::Good)) => Some(Sign::Good),
         (_, Some(StepState::Improvable)) => Some(Sign::Warning),
         _ => None,
@@ -138,6 +145,10 @@ fn mark(ui: &mut egui::Ui, state: &State, step: Step) {
             ui.painter().circle_stroke(rect.center(), 6.0, stroke);
         }
     }
+}
+
+fn sign(passed: bool) -> Sign {
+    if passed { Sign::Good } else { Sign::Bad }
 }
 
 /// A button among others of the same text has a name of its own.
@@ -158,16 +169,17 @@ pub(super) fn instructions(ui: &mut egui::Ui, task: Task, state: &State, simulat
     ui.add_space(theme::GAP);
 }
 
-/// When all is done: how good it is, and what would make it better.
-pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
+/// When all is done: how good it is, and what would make it better; `is_old`: whether that is what is to be done about it. True
+/// when scanning is to begin.
+pub(super) fn verdict(ui: &mut egui::Ui, state: &State, is_old: bool) -> bool {
     let mut line = |sign: Sign, text: &str| {
         ui.horizontal_top(|ui| {
             sign.ui(ui);
             ui.add(egui::Label::new(text).wrap());
         });
     };
-    if let Some(passed) = state.passed {
-        line(if passed { Sign::Good } else { Sign::Bad }, texts::verdict(passed));
+    if let Some(passed) = state.verdict.as_ref().map(|verdict| verdict.passed) {
+        line(sign(passed), texts::verdict(passed));
     }
     if let Some(sigma) = state.status.position_sigma_mm {
         line(Sign::Good, &texts::sigma(sigma, state.status.next_sigma_mm));
@@ -175,14 +187,15 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State) {
     for advice in &state.status.exposure {
         line(Sign::Warning, advice);
     }
-    ui.add(
-        egui::Label::new(
-            RichText::new(texts::better(&state.status.action, state.begun, state.passed.is_some()))
-                .weak(),
-        )
-        .wrap(),
-    );
+    if !is_old || state.status.action != Action::Check {
+        let text = texts::better(&state.status.action, state.begun, state.verdict.is_some());
+        ui.add(egui::Label::new(RichText::new(text).weak()).wrap());
+    }
     ui.add_space(theme::GAP);
+    let size = vec2(220.0, theme::BIG);
+    let scan = crate::widgets::primary(ui, texts::SCAN, size, true).clicked();
+    ui.add_space(theme::GAP);
+    scan
 }
 
 /// What went wrong last and what to do, and where something went that was put away.
@@ -268,7 +281,8 @@ fn field(ui: &mut egui::Ui, text: &str, value: egui::DragValue<'_>) {
 /// How old it is, and from when on that counts.
 pub(super) fn age(ui: &mut egui::Ui, state: &State, targets: &mut TargetSettings) {
     let limit = targets.expires_after_days;
-    match state.age_days {
+    let unfinished = state.status.steps.iter().any(|step| step.state == StepState::Missing);
+    match state.age_days.filter(|_| !unfinished) {
         None => {
             ui.label(RichText::new(texts::NEVER).weak());
         }

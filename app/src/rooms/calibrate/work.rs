@@ -2,7 +2,7 @@
 
 use super::picture::{Marks, Picture};
 use super::task::{BOARD, GREY, Pose, State, Step, TargetSettings, Task};
-use super::{Ask, Report, Told, foresee::Sheets, history};
+use super::{Ask, Report, Told, foresee::Sheets, history, verdict::Verdict};
 use crate::place::Place;
 use crate::texts::calibrate as texts;
 use crate::worker::{Ended, Outbox, Tools, Update, instruments::with_instruments};
@@ -30,8 +30,6 @@ pub struct Memory {
     /// By the frame's hash.
     seen: HashMap<String, Option<SeenBoard>>,
     sheets: Sheets,
-    /// Whether the sheet that the fit has not seen passed, and under which `lights.toml`.
-    passed: Option<(String, bool)>,
 }
 
 /// Largest slope error that passes, degrees: as on the command line.
@@ -47,7 +45,7 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         Ask::Refresh => Ok(()),
         Ask::Take(task, targets) => take(task, &targets, tools, out),
         Ask::Look(task, targets) => look(task, &targets, tools, out),
-        Ask::Fit(step) => fit(step, &place, tools, out),
+        Ask::Fit(step) => fit(step, &place, out),
         Ask::Again(step) => told(again(step, &place), out),
         Ask::Anew => told(anew(&place), out),
         Ask::Restore(entry) => told(history::restore(&place, &entry), out),
@@ -184,10 +182,10 @@ fn take(
     // The fit follows its last picture.
     let next = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
     match next?.next() {
-        Task::Fit(step) if good => fit(step, &place, tools, out),
+        Task::Fit(step) if good => fit(step, &place, out),
         Task::Fit(_) => Err(Ended::Cancelled),
         // Of a calibration that was made elsewhere.
-        _ if task == Task::Sheet(Pose::Check) => fit(Step::Check, &place, tools, out),
+        _ if task == Task::Sheet(Pose::Check) => fit(Step::Check, &place, out),
         _ => Ok(()),
     }
 }
@@ -353,7 +351,7 @@ fn read(session: &Session, entry: &FrameEntry) -> Result<Frame, AnyError> {
 }
 
 /// The fit of a step, the same call as the command line's.
-fn fit(step: Step, place: &Place, tools: &mut Tools, out: &Outbox) -> Result<(), Ended> {
+fn fit(step: Step, place: &Place, out: &Outbox) -> Result<(), Ended> {
     let (rig, targets, calibration) = (place.rig_file(), place.targets(), place.calibration());
     let progress = |share: f64, what: &str| out.tick(share, what);
     let fitted = out.job(texts::fitting(step), || -> Result<(Report, Vec<String>), AnyError> {
@@ -391,7 +389,7 @@ fn fit(step: Step, place: &Place, tools: &mut Tools, out: &Outbox) -> Result<(),
                     out: None,
                 };
                 let report = calibrate::check(&options, &progress)?;
-                tools.calibrate.passed = lights_hash(place).map(|hash| (hash, report.passed));
+                Verdict::of(&report, place).keep(place)?;
                 let warnings = report.warnings.clone();
                 (Report::Check(Box::new(report)), warnings)
             }
@@ -412,10 +410,6 @@ fn sheets(place: &Place) -> Vec<PathBuf> {
 /// Every light, the ambient light, and the first light again.
 pub(super) fn is_complete(folder: &Path, rig: &Rig) -> bool {
     Session::load(folder).is_ok_and(|session| session.frames.len() >= rig.lights.len() + 2)
-}
-
-fn lights_hash(place: &Place) -> Option<String> {
-    sha256_of_file(&place.calibration().join("lights.toml")).ok()
 }
 
 /// The pictures of a step, and of all that follow from them, into the history. Where they are now.
@@ -457,8 +451,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
     let whole = |pose: Pose| is_complete(&place.targets().join(pose.folder()), &place.rig);
     let mut sheets: Vec<Pose> = Pose::FIT.into_iter().filter(|pose| whole(*pose)).collect();
     sheets.extend(Some(Pose::Check).filter(|pose| whole(*pose)));
-    let now = lights_hash(place);
-    let passed = memory.passed.as_ref().filter(|(hash, _)| Some(hash) == now.as_ref());
+    let checked = sheets.contains(&Pose::Check);
     let mut state = State {
         begun: begun(place),
         boards: [seen.len(), found.len()],
@@ -467,7 +460,7 @@ fn state(place: &Place, memory: &mut Memory, out: &Outbox) -> Result<State, AnyE
         so_far: shape.map(|shape| boards_so_far(&found, &shape, size_px)).unwrap_or_default(),
         chart: is_complete(&place.targets().join(GREY), &place.rig),
         fresh: fresh(place, calibration.as_ref(), &sheets),
-        passed: passed.map(|(_, passed)| *passed).filter(|_| sheets.contains(&Pose::Check)),
+        verdict: Verdict::load(place).filter(|_| checked),
         age_days: calibration.as_ref().and_then(crate::place::age_days),
         history: history::entries(place),
         sees_chessboards: cfg!(feature = "opencv"),
