@@ -2,7 +2,7 @@
 
 mod report;
 
-pub use report::{DeviceReport, PlaneReport, Report, ResidualFile};
+pub use report::{DeviceReport, InputFolders, PlaneReport, Report, ResidualFile};
 
 use crate::files::{FileError, OutputKind};
 use std::path::{Path, PathBuf};

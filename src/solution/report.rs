@@ -58,12 +58,36 @@ pub struct Report {
     pub warnings: Vec<String>,
     /// The capture session's manifest and the calibration's files, with their hashes.
     pub inputs: Vec<Input>,
+    /// Where these were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub folders: Option<InputFolders>,
     /// Who solved the photosites that have all their samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub device: Option<DeviceReport>,
     /// Hash of inputs and settings together: the same key means the same solution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub key: Option<String>,
+}
+
+/// Where the inputs of a solve were, in `report.json`: whole paths, for whoever wants to look at the frames again. They may have
+/// moved since; the hashes of the inputs tell whether what is there is what was solved.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct InputFolders {
+    /// The capture session.
+    pub session: String,
+    /// The calibration.
+    pub calibration: String,
+}
+
+impl InputFolders {
+    /// Of folders as they were named.
+    pub fn new(session: &Path, calibration: &Path) -> Self {
+        let whole = |path: &Path| {
+            let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+            path.display().to_string()
+        };
+        Self { session: whole(session), calibration: whole(calibration) }
+    }
 }
 
 /// Who solved, in `report.json`.
@@ -208,6 +232,7 @@ mod tests {
             residuals: vec![ResidualFile { light: 3, file: "residual-03.exr".into() }],
             warnings: vec!["light 1 has no frame".into()],
             inputs: vec![Input { name: "session.toml".into(), sha256: "ab".into() }],
+            folders: Some(InputFolders::new(Path::new("/scans/linen"), Path::new("calibration"))),
             device: Some(DeviceReport::processor("asked for".into())),
             key: None,
         }
@@ -219,6 +244,9 @@ mod tests {
         let path = folder.path().join("report.json");
         report().write(&path).unwrap();
         assert_eq!(Report::read(&path).unwrap(), report());
+        let folders = report().folders.unwrap();
+        assert_eq!(Path::new(&folders.session), Path::new("/scans/linen"));
+        assert!(Path::new(&folders.calibration).is_absolute(), "{folders:?}");
         let unfinished = Report { residual_rms: Some(f64::NAN), ..report() };
         assert!(unfinished.write(&path).unwrap_err().to_string().contains("not a finite number"));
         assert_eq!(Report::read(&path).unwrap(), report());

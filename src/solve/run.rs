@@ -22,7 +22,7 @@ use crate::instrument::{
 use crate::photometry::{Method, Outcome};
 use crate::raw::preview;
 use crate::session::Session;
-use crate::solution::{OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, Report};
+use crate::solution::{InputFolders, OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, Report};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -157,6 +157,7 @@ fn make(
     report.warnings = warnings;
     report.device = Some(device);
     report.inputs = made_from.inputs;
+    report.folders = Some(InputFolders::new(&options.session, &options.calibration));
     report.key = Some(made_from.key);
     report.swatch = swatch;
     report.seconds = watch.seconds.clone();
@@ -299,6 +300,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         residuals: vec![],
         warnings: vec![],
         inputs: vec![],
+        folders: None,
         device: None,
         key: None,
         swatch: None,
