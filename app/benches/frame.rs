@@ -104,8 +104,7 @@ impl Window {
             mm_per_px: None,
             warnings: Vec::new(),
             method: "auto".to_owned(),
-            undistorted: false,
-            capture: None,
+            frames: Err(String::new()),
             lights: Vec::new(),
         };
         look.hear(Told::Opened(Box::new(opened)), &mut desk);

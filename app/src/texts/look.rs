@@ -2,6 +2,8 @@
 
 #![allow(missing_docs, reason = "a text says what it is")]
 
+use std::path::Path;
+
 pub const HEADING: &str = "Look";
 pub const WHAT: &str = "A solution's maps, pixel by pixel, under any light.";
 pub const NOTHING_YET: &str =
@@ -12,7 +14,7 @@ pub const OPEN: &str = "Open";
 pub const COMPARE: &str = "Compare";
 pub const OPEN_MENU: &str = "Open…";
 pub const COMPARE_MENU: &str = "Compare with…";
-pub const NO_GRAPHICS: &str = "This computer's graphics cannot draw maps; update its graphics driver, or install a Vulkan driver.";
+pub const NO_GRAPHICS: &str = "Maps cannot be drawn: no usable graphics was found.\nInstall a Vulkan driver (mesa-vulkan-drivers) and start again.";
 
 /// What the mouse does, and a hint.
 pub const TOOLS: [(&str, &str); 4] = [
@@ -30,6 +32,8 @@ pub const ONE_TO_ONE: &str = "1 : 1";
 pub const ONE_TO_ONE_HINT: &str = "A pixel of the screen for each photosite (1)";
 pub const UNDO: &str = "Undo";
 pub const REDO: &str = "Redo";
+pub const UNDO_HINT: &str = "The mask's last step, or the last line (Ctrl+Z)";
+pub const REDO_HINT: &str = "Ctrl+Shift+Z";
 pub const MAPS: &str = "Maps";
 pub const DIVIDER: &str = "Divider";
 pub const BEING_MADE: &str = "Reading the frames…";
@@ -56,8 +60,11 @@ pub const SLOPE: &str = "Slope";
 pub const ANGLE: &str = "Angle between the normals";
 pub const RESIDUAL: &str = "Measured − predicted";
 pub const DIFFERENCE: &str = "Difference, of white";
-pub const NO_FRAMES: &str = "The scan that this was solved from is not among this rig's scans.";
-pub const OTHER_GRID: &str = "These maps were undistorted; the frames lie on another grid.";
+pub const FRAMES_MISSING: &str = "No frames";
+pub const NO_FRAMES: &str = "Its report does not say where the scan is, and this rig has none of its name. Solve the scan again to see its frames.";
+pub const NO_CALIBRATION: &str = "The calibration that it was solved with is gone, and this rig has none. Calibrate, or put it back, to see the frames.";
+pub const OTHER_GRID: &str =
+    "These maps were undistorted; the frames lie on another grid. Solve without it to see them.";
 pub const NO_OTHER: &str = "Compare with another solution first.";
 
 pub const LIGHT: &str = "Light";
@@ -85,7 +92,7 @@ pub const ERROR: &str = "± error";
 pub const UNSOLVED: &str = "not solved";
 pub const SOLVING_AGAIN: &str = "Asking the frames…";
 pub const NOT_SOLVED_AGAIN: &str = "The frames could not be read.";
-pub const FRAMES_CHANGED: &str = "The scan was changed since it was solved.";
+pub const FRAMES_CHANGED: &str = "Scan or calibration changed since it was solved.";
 pub const LIGHT_COLUMNS: [&str; 4] = ["Light", "Measured", "Fit", ""];
 pub const USED: &str = "used";
 pub const CLIPPED: &str = "clipped";
@@ -166,6 +173,14 @@ pub fn figures(mean: f64, median: f64, p95: f64) -> String {
 
 pub fn line_figures(length_mm: f64, rise_mm: f64) -> String {
     format!("{} long, ends {rise_mm:+.3} mm from where it began", length(length_mm))
+}
+
+pub fn frames_gone(folder: &Path) -> String {
+    format!("Its scan is not at {} any more. Put it back, or solve it again.", folder.display())
+}
+
+pub fn reduced(scale: usize) -> String {
+    format!("This is a preview at 1/{scale} of the frames' size. Solve at full size to see them.")
 }
 
 pub fn against(name: &str) -> String {

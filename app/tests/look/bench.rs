@@ -50,6 +50,27 @@ impl Bench {
         folder
     }
 
+    /// A solution of another size: a preview.
+    pub(crate) fn preview(&self, name: &str) -> PathBuf {
+        let folder = self.rig().join("solutions").join(name);
+        let mut options = solve::Options::new(self.scan(), self.rig().join("calibration"), &folder);
+        options.method = Method::LeastSquares;
+        options.scale = solve::Scale::Half;
+        solve::run(&options, &|_| {}).unwrap();
+        folder
+    }
+
+    /// A scan and its solution, with a calibration of their own, in folders that no rig has.
+    pub(crate) fn elsewhere(&self) -> [PathBuf; 2] {
+        let [scan, calibration, solution] = ["shot today", "lights of March", "result"]
+            .map(|name| self.folder.path().join("elsewhere").join(name));
+        copy(&self.scan(), &scan);
+        copy(&self.rig().join("calibration"), &calibration);
+        let options = solve::Options::new(&scan, &calibration, &solution);
+        solve::run(&options, &|_| {}).unwrap();
+        [scan, solution]
+    }
+
     /// The capture session.
     pub(crate) fn scan(&self) -> PathBuf {
         self.rig().join("scans").join(SOLUTION)
@@ -62,6 +83,17 @@ impl Bench {
 
     /// The Look room with nothing in it.
     pub(crate) fn empty(&self, size: [f32; 2], theme: egui::Theme) -> Window {
+        self.window(size, theme, true)
+    }
+
+    /// The Look room on a computer without graphics.
+    pub(crate) fn without_graphics(&self, size: [f32; 2], theme: egui::Theme) -> Window {
+        let mut window = self.window(size, theme, false);
+        open(&mut window, &self.solution());
+        window
+    }
+
+    fn window(&self, size: [f32; 2], theme: egui::Theme, graphics: bool) -> Window {
         let mut settings = Settings::load_from(&self.folder.path().join("settings.toml"));
         settings.home = self.folder.path().to_owned();
         settings.rig = Some(self.rig());
@@ -72,7 +104,8 @@ impl Bench {
         };
         let builder = Harness::builder().with_size(size).with_theme(theme).with_max_steps(64);
         let mut window = builder.with_render_cursor(false).wgpu().build_eframe(move |cc| {
-            App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings)
+            let renderer = cc.wgpu_render_state.as_ref().filter(|_| graphics);
+            App::new(&cc.egui_ctx, renderer, settings)
         });
         wait(&mut window, "the rig", |window| window.state().desk().place.is_some());
         window.run();
@@ -82,15 +115,40 @@ impl Bench {
     /// The Look room with the solution, opened as a user does.
     pub(crate) fn look(&self, size: [f32; 2], theme: egui::Theme) -> Window {
         let mut window = self.empty(size, theme);
-        enter_folder(&mut window, &self.solution());
-        window.get_by_label("Open").click();
-        wait(&mut window, "the solution", |window| window.query_by_label(SOLUTION).is_some());
-        window.run();
+        open(&mut window, &self.solution());
         window
     }
 
     fn rig(&self) -> PathBuf {
         self.folder.path().join("rig")
+    }
+}
+
+/// Opens a solution, as a user does who has none yet.
+pub(crate) fn open(window: &mut Window, solution: &Path) {
+    enter_folder(window, solution);
+    window.get_by_label("Open").click();
+    let name = solution.file_name().unwrap().to_string_lossy();
+    wait(window, "the solution", |window| window.query_by_label(&name).is_some());
+    window.run();
+}
+
+/// Opens a solution where there is one already.
+pub(crate) fn open_another(window: &mut Window, solution: &Path) {
+    window.get_by_label("Open…").click();
+    window.run();
+    enter_folder(window, solution);
+    window.get_by_label("Open").click();
+    window.run();
+    wait(window, "the solution", |window| window.state().is_idle());
+    window.run();
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
     }
 }
 

@@ -10,7 +10,7 @@ mod tiles;
 
 use bench::{Bench, SOLUTION};
 use eframe::egui::{self, Key, Modifiers, pos2};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use weavelight::solution::Report;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
@@ -122,6 +122,99 @@ fn another_solution_is_compared() {
         window.query_by_label("Against plain").is_some()
     });
     window.get_by_label("Angle between the normals");
+}
+
+#[test]
+fn the_frames_of_a_solution_are_found_wherever_they_are() {
+    let bench = Bench::new();
+    let [scan, solution] = bench.elsewhere();
+    let mut window = bench.empty(SIZE, egui::Theme::Dark);
+    bench::open(&mut window, &solution);
+    assert!(window.query_by_label_contains("No frames").is_none());
+    let changed = "Scan or calibration changed since it was solved.";
+    let solve_photosite = |window: &mut bench::Window| {
+        window.drag_at(CLOTH[0]);
+        window.drop_at(CLOTH[0]);
+        bench::wait(window, "its lights", |window| {
+            window.query_all_by_label_contains("used").next().is_some()
+        });
+        window.query_by_label(changed).is_some()
+    };
+    assert!(!solve_photosite(&mut window), "nothing has changed yet");
+    // Another manifest is another scan: it is shown, and that it has changed is said.
+    let manifest = std::fs::read_to_string(scan.join("session.toml")).unwrap();
+    std::fs::write(scan.join("session.toml"), format!("{manifest}\n# edited\n")).unwrap();
+    bench::open_another(&mut window, &solution);
+    assert!(solve_photosite(&mut window), "the manifest has changed");
+    // And what is not there is missed, by its path.
+    std::fs::rename(&scan, scan.with_file_name("moved")).unwrap();
+    bench::open_another(&mut window, &solution);
+    bench::wait(&mut window, "that the frames are gone", |window| {
+        window.query_by_label_contains("No frames. Its scan is not at").is_some()
+    });
+}
+
+#[test]
+fn a_preview_says_why_it_shows_no_frames() {
+    let bench = Bench::new();
+    let mut window = bench.empty(SIZE, egui::Theme::Dark);
+    bench::open(&mut window, &bench.preview("preview"));
+    window.get_by_label_contains("No frames. This is a preview at 1/2");
+}
+
+#[test]
+fn lines_are_undone_in_turn_with_the_mask() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    let length = |window: &bench::Window| {
+        let along = window.query_by_label_contains("mm from where it began");
+        along.map(|along| {
+            let node = along.accesskit_node();
+            node.value().or(node.label()).unwrap_or_default()
+        })
+    };
+    window.get_by_label("Line").click();
+    window.run();
+    bench::drag(&mut window, CLOTH);
+    let first = length(&window);
+    bench::drag(&mut window, [CLOTH[0], CLOTH[0] + egui::vec2(60.0, 0.0)]);
+    let second = length(&window);
+    assert!(first.is_some() && second.is_some() && first != second, "{first:?} {second:?}");
+    window.get_by_label("Brush").click();
+    window.run();
+    window.get_by_label("Leave all out").click();
+    window.run();
+    let savable = |window: &bench::Window| {
+        !window.get_by_label("Save and solve again").accesskit_node().is_disabled()
+    };
+    assert!(!savable(&window), "nothing is left to solve");
+    let key = |window: &mut bench::Window, modifiers| {
+        window.key_press_modifiers(modifiers, Key::Z);
+        window.run();
+    };
+    let (undo, redo) = (Modifiers::COMMAND, Modifiers::COMMAND | Modifiers::SHIFT);
+    key(&mut window, undo);
+    assert!(savable(&window));
+    assert_eq!(length(&window), second);
+    key(&mut window, undo);
+    assert_eq!(length(&window), first);
+    key(&mut window, undo);
+    assert_eq!(length(&window), None);
+    (0..3).for_each(|_| key(&mut window, redo));
+    assert_eq!(length(&window), second);
+    assert!(!savable(&window));
+}
+
+#[test]
+fn without_graphics_the_remedy_is_said() {
+    let bench = Bench::new();
+    let mut window = bench.without_graphics(SIZE, egui::Theme::Dark);
+    window.get_by_label_contains("Maps cannot be drawn");
+    window.get_by_label_contains("Vulkan driver");
+    // The numbers are there all the same.
+    window.hover_at(CLOTH[0]);
+    window.run();
+    window.get_by_label("Loupe");
 }
 
 #[test]

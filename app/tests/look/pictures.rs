@@ -3,6 +3,7 @@
 use super::bench::{self, Bench};
 use eframe::egui::{self, pos2};
 use egui_kittest::kittest::Queryable;
+use std::path::Path;
 
 const SIZES: [[f32; 2]; 2] = [[1280.0, 800.0], [960.0, 640.0]];
 const THEMES: [(egui::Theme, &str); 2] =
@@ -80,6 +81,43 @@ fn a_mask_being_painted() {
         window.run();
         bench::drag(window, [pos2(300.0, 250.0), pos2(460.0, 330.0)]);
     });
+}
+
+#[test]
+fn a_solution_without_its_normals() {
+    check("broken", Bench::empty, |window| {
+        // A path that is the same everywhere.
+        bench::enter_folder(window, Path::new("tests/look/without normals"));
+        window.get_by_label("Open").click();
+        wait_for_problem(window, "normal.exr");
+    });
+}
+
+#[test]
+fn a_comparison_of_another_size() {
+    let open = |bench: &Bench, size, theme| {
+        let preview = bench.preview("preview");
+        let mut window = bench.look(size, theme);
+        window.get_by_label("Compare with…").click();
+        window.run();
+        bench::enter_folder(&mut window, &preview);
+        window
+    };
+    check("other-size", open, |window| {
+        window.get_by_label("Compare").click();
+        wait_for_problem(window, "preview is 72 × 48 px");
+    });
+}
+
+#[test]
+fn no_graphics_to_draw_with() {
+    check("no-graphics", Bench::without_graphics, |_| {});
+}
+
+fn wait_for_problem(window: &mut bench::Window, text: &str) {
+    bench::wait(window, "a problem", |window| !window.state().desk().problems.is_empty());
+    window.run();
+    window.get_by_label_contains(text);
 }
 
 fn choose(window: &mut bench::Window, list: &str, entry: &str) {

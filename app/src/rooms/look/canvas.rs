@@ -64,6 +64,10 @@ impl Look {
             Tool::Line => self.draw_line(&shown),
             Tool::Brush | Tool::Lasso => self.paint(&shown, maps.size()),
         }
+        if !view::can_draw(ui.ctx()) {
+            // Nothing to draw over.
+            return;
+        }
         let ui = &mut ui.new_child(egui::UiBuilder::new().max_rect(shown.rect));
         ui.set_clip_rect(shown.rect);
         self.show_mask(ui, &shown);
@@ -122,12 +126,12 @@ impl Look {
     /// Asks which lights a photosite rests on.
     pub(super) fn take_photosite(&mut self, at: [usize; 2], desk: &mut Desk) {
         let Some(opened) = &self.opened else { return };
-        let frames = opened.capture.as_ref().filter(|_| !opened.undistorted);
-        let found = if frames.is_some() { None } else { Some(None) };
-        self.taken = Some(Taken { at, found });
-        if let Some(capture) = frames {
-            desk.ask(Command::Look(Ask::Photosite(capture.session.clone(), at)));
+        let capture = opened.capture();
+        let found = if capture.is_some() { None } else { Some(None) };
+        if let Some(capture) = capture {
+            desk.ask(Command::Look(Ask::Photosite(capture.sources.clone(), at)));
         }
+        self.taken = Some(Taken { at, found });
     }
 
     fn draw_line(&mut self, shown: &Shown) {
@@ -139,7 +143,7 @@ impl Look {
                 let moved = response.total_drag_delta().unwrap_or_default();
                 shown.viewport.pixel_at(now - moved, shown.rect)
             });
-            self.line = Some([start, at]);
+            self.set_line(Some([start, at]));
         }
         if response.dragged_by(egui::PointerButton::Primary)
             && let Some(line) = &mut self.line
@@ -148,18 +152,18 @@ impl Look {
             self.measure();
         }
         if response.clicked() {
-            (self.line, self.profile) = (None, None);
+            self.set_line(None);
         }
     }
 
-    fn measure(&mut self) {
+    /// Looks up what lies along the line.
+    pub(super) fn measure(&mut self) {
         let maps = self.opened.as_ref().map(|opened| &opened.maps);
         self.profile = maps.zip(self.line).map(|(maps, line)| along(maps, line));
     }
 
     fn paint(&mut self, shown: &Shown, size: [usize; 2]) {
-        let mask =
-            self.opened.as_ref().and_then(|o| o.capture.as_ref()).and_then(|c| c.mask.as_ref());
+        let mask = self.opened.as_ref().and_then(|o| o.capture()).and_then(|c| c.mask.as_ref());
         let painting = self.painting.get_or_insert_with(|| super::Painting::new(size, mask));
         let response = &shown.response;
         let canvas = &mut self.canvas;
@@ -171,9 +175,12 @@ impl Look {
             }
         } else if !canvas.stroke.is_empty() {
             let stroke = std::mem::take(&mut canvas.stroke);
-            match self.tool {
+            let changed = match self.tool {
                 Tool::Lasso => painting.lasso(&stroke, !canvas.erases),
                 _ => painting.brush(&stroke, canvas.radius_px(size), !canvas.erases),
+            };
+            if changed {
+                self.edits.changed_mask();
             }
         }
         if response.hovered() {

@@ -89,6 +89,16 @@ impl Layers {
         self.shows(Layer::Residual)
     }
 
+    /// Without what only a comparison shows.
+    pub(super) fn of_one_solution(mut self) -> Self {
+        for (side, instead) in self.sides.iter_mut().zip(Self::default().sides) {
+            if matches!(side, Layer::OtherNormal | Layer::Angle) {
+                *side = instead;
+            }
+        }
+        self
+    }
+
     /// Another solution has come: shows where both differ.
     pub(super) fn compare(&mut self) {
         (self.sides[0], self.compose) = (Layer::Angle, Compose::Single);
@@ -97,14 +107,12 @@ impl Layers {
 
 impl Look {
     /// Whether a layer can be shown, and why not.
-    pub(super) fn why_not(&self, layer: Layer) -> Option<&'static str> {
+    pub(super) fn why_not(&self, layer: Layer) -> Option<&str> {
         let opened = self.opened.as_ref()?;
         let of_frames = matches!(layer, Layer::Frame | Layer::Residual);
         let of_other = matches!(layer, Layer::OtherNormal | Layer::Angle);
-        if of_frames && opened.capture.is_none() {
-            Some(texts::NO_FRAMES)
-        } else if of_frames && opened.undistorted {
-            Some(texts::OTHER_GRID)
+        if of_frames {
+            opened.frames.as_ref().err().map(String::as_str)
         } else if of_other && self.other.is_none() {
             Some(texts::NO_OTHER)
         } else {

@@ -13,7 +13,11 @@ use weavelight::solve::{Part, Photosite};
 /// Photosites along the loupe's side: odd, so that one is in the middle.
 const SIDE: isize = 11;
 /// Side of one, points.
-const CELL: f32 = 7.0;
+const CELL: f32 = 8.0;
+/// Height of a line of numbers.
+const LINE: f32 = 15.0;
+/// Widths of the columns of a photosite's lights, points.
+const COLUMNS: [f32; 3] = [44.0, 70.0, 56.0];
 
 impl Look {
     pub(super) fn loupe(&self, ui: &mut Ui) {
@@ -26,6 +30,7 @@ impl Look {
         let sample = maps.sample(at[0], at[1]);
         ui.horizontal_top(|ui| {
             magnify(ui, maps, at);
+            ui.add_space(theme::GAP / 2.0);
             ui.vertical(|ui| numbers(ui, maps, at, sample.as_ref()));
         });
         match &self.taken {
@@ -42,7 +47,7 @@ impl Look {
     /// Which lights the photosite that was clicked rests on, and why not on the others.
     fn lights_of(&self, ui: &mut Ui, taken: &super::Taken) {
         ui.label(RichText::new(texts::photosite(taken.at)).strong());
-        let changed = self.opened.as_ref().and_then(|o| o.capture.as_ref()).map(|c| c.changed);
+        let changed = self.opened.as_ref().and_then(|o| o.capture()).map(|c| c.changed);
         match (&taken.found, changed) {
             (None, _) => {
                 ui.label(RichText::new(texts::SOLVING_AGAIN).weak());
@@ -89,7 +94,7 @@ fn magnify(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2]) {
 }
 
 fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>) {
-    ui.spacing_mut().item_spacing.y = 1.0;
+    close_lines(ui);
     let row =
         |ui: &mut Ui, name: &str, value: String| cells(ui, &[(name, 52.0), (value.as_str(), 0.0)]);
     row(ui, texts::PIXEL, format!("{x}, {y}"));
@@ -108,41 +113,55 @@ fn numbers(ui: &mut Ui, maps: &Maps, [x, y]: [usize; 2], sample: Option<&Sample>
     row(ui, texts::ERROR, format!("{:.2}°", sample.error_deg));
 }
 
+/// Lines of numbers, close together.
+fn close_lines(ui: &mut Ui) {
+    ui.spacing_mut().interact_size.y = LINE;
+    ui.spacing_mut().item_spacing.y = 0.0;
+}
+
 /// Texts on one line, each in a cell of its width (points; 0 for what is left). Their own widths never move the cells, as
 /// they would in a grid.
 fn cells(ui: &mut Ui, texts: &[(&str, f32)]) {
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 0.0;
-        ui.spacing_mut().interact_size.y = 15.0;
-        for (text, width) in texts {
-            let label = egui::Label::new(RichText::new(*text).size(12.0)).extend();
-            let start = ui.cursor().left();
-            ui.add(label);
-            let used = ui.cursor().left() - start;
-            ui.add_space((width - used).max(0.0));
-        }
-    });
+    ui.horizontal(|ui| cells_in_line(ui, texts));
+}
+
+fn cells_in_line(ui: &mut Ui, texts: &[(&str, f32)]) {
+    ui.spacing_mut().item_spacing.x = 0.0;
+    for (text, width) in texts {
+        let label = egui::Label::new(RichText::new(*text).size(12.0)).extend();
+        let start = ui.cursor().left();
+        ui.add(label);
+        let used = ui.cursor().left() - start;
+        ui.add_space((width - used).max(0.0));
+    }
 }
 
 fn table(ui: &mut Ui, photosite: &Photosite) {
-    ui.spacing_mut().item_spacing.y = 1.0;
+    close_lines(ui);
     let [light, measured, fit, _] = texts::LIGHT_COLUMNS;
-    cells(ui, &[(light, 44.0), (measured, 66.0), (fit, 52.0)]);
+    ui.scope(|ui| {
+        ui.visuals_mut().override_text_color = Some(ui.visuals().weak_text_color());
+        cells(ui, &in_columns([light, measured, fit]));
+    });
     for sample in &photosite.samples {
         let number = |value: Option<f32>| value.map_or("–".to_owned(), |v| format!("{v:.3}"));
-        let (sign, text) = verdict(sample.part);
+        let texts = [sample.light.to_string(), number(sample.measured), number(sample.predicted)];
+        let (sign, said) = verdict(sample.part);
         ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            let numbers =
-                [sample.light.to_string(), number(sample.measured), number(sample.predicted)];
-            let [light, measured, fit] = numbers.each_ref().map(String::as_str);
-            cells(ui, &[(light, 44.0), (measured, 66.0), (fit, 52.0)]);
+            cells_in_line(ui, &in_columns(texts.each_ref().map(String::as_str)));
+            let (place, _) = ui.allocate_exact_size(vec2(16.0, LINE), Sense::hover());
             if let Some(sign) = sign {
-                sign.ui(ui);
+                sign.paint(ui.painter(), place.center(), 5.0);
             }
-            ui.label(RichText::new(text).size(12.0));
+            let said = RichText::new(said).size(12.0);
+            let plays_no_part = matches!(sample.part, Part::TurnedAway | Part::Unsolved);
+            ui.label(if plays_no_part { said.weak() } else { said });
         });
     }
+}
+
+fn in_columns(texts: [&str; 3]) -> [(&str, f32); 3] {
+    [0, 1, 2].map(|k| (texts[k], COLUMNS[k]))
 }
 
 fn verdict(part: Part) -> (Option<Sign>, &'static str) {

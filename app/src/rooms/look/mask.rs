@@ -5,7 +5,7 @@ use std::sync::Arc;
 use weavelight_calibration::description::Image;
 
 /// Steps that can be undone.
-const MOST_STEPS: usize = 100;
+pub(super) const MOST_STEPS: usize = 100;
 
 /// A mask that is being painted.
 #[derive(Clone, Debug)]
@@ -35,8 +35,8 @@ impl Painting {
         &self.mask
     }
 
-    /// Paints along a stroke (pixel coordinates) with a round brush.
-    pub fn brush(&mut self, stroke: &[[f64; 2]], radius_px: f64, inside: bool) {
+    /// Paints along a stroke (pixel coordinates) with a round brush. True where that changes something.
+    pub fn brush(&mut self, stroke: &[[f64; 2]], radius_px: f64, inside: bool) -> bool {
         let mut step = Step::new();
         let dot = stroke.first().map(|at| [*at, *at]);
         let lines = stroke.windows(2).map(|ends| [ends[0], ends[1]]);
@@ -47,11 +47,11 @@ impl Painting {
                 }
             }
         }
-        self.did(step);
+        self.did(step)
     }
 
-    /// Fills a closed line (pixel coordinates).
-    pub fn lasso(&mut self, line: &[[f64; 2]], inside: bool) {
+    /// Fills a closed line (pixel coordinates). True where that changes something.
+    pub fn lasso(&mut self, line: &[[f64; 2]], inside: bool) -> bool {
         let mut step = Step::new();
         let rows = if line.len() > 2 { self.rows(line, 0.0) } else { 0..0 };
         for y in rows {
@@ -62,21 +62,16 @@ impl Painting {
                 self.set(y, [between[0].floor() + 1.0, between[1]], inside, &mut step);
             }
         }
-        self.did(step);
+        self.did(step)
     }
 
-    /// Everything inside, or nothing.
-    pub fn fill(&mut self, inside: bool) {
+    /// Everything inside, or nothing. True where that changes something.
+    pub fn fill(&mut self, inside: bool) -> bool {
         let mut step = Step::new();
         for y in 0..self.mask.height {
             self.set(y, [0.0, self.mask.width as f64], inside, &mut step);
         }
-        self.did(step);
-    }
-
-    /// Whether something can be undone, and redone.
-    pub fn steps(&self) -> [bool; 2] {
-        [!self.done.is_empty(), !self.undone.is_empty()]
+        self.did(step)
     }
 
     /// Takes the last step back.
@@ -118,9 +113,9 @@ impl Painting {
         }
     }
 
-    fn did(&mut self, step: Step) {
+    fn did(&mut self, step: Step) -> bool {
         if step.is_empty() {
-            return;
+            return false;
         }
         self.done.push(step);
         self.undone.clear();
@@ -128,6 +123,7 @@ impl Painting {
             self.done.remove(0);
         }
         self.touch();
+        true
     }
 
     fn turn_over(&mut self, step: &Step) {
@@ -187,6 +183,10 @@ mod tests {
         painting.mask().data.iter().filter(|inside| !**inside).count()
     }
 
+    fn steps(painting: &Painting) -> [bool; 2] {
+        [!painting.done.is_empty(), !painting.undone.is_empty()]
+    }
+
     #[test]
     fn every_step_is_undone_and_redone() {
         let mut painting = Painting::new([40, 30], None);
@@ -199,12 +199,12 @@ mod tests {
         let most = outside(&painting);
         assert_eq!(most, 29 + 70 + 5 * 40);
         (0..5).for_each(|_| painting.undo());
-        assert_eq!((outside(&painting), painting.steps()), (0, [false, true]));
+        assert_eq!((outside(&painting), steps(&painting)), (0, [false, true]));
         (0..5).for_each(|_| painting.redo());
-        assert_eq!((outside(&painting), painting.steps()), (most, [true, false]));
+        assert_eq!((outside(&painting), steps(&painting)), (most, [true, false]));
         painting.undo();
         painting.fill(true);
-        assert_eq!((outside(&painting), painting.steps()), (0, [true, false]));
+        assert_eq!((outside(&painting), steps(&painting)), (0, [true, false]));
     }
 
     /// Square of the distance from a point to a line of several points: the plain meaning of the brush.
@@ -261,9 +261,10 @@ mod tests {
     #[test]
     fn strokes_beside_the_picture_change_nothing() {
         let mut painting = Painting::new([40, 30], None);
-        painting.brush(&[[-50.0, 10.0]], 3.0, false);
-        painting.lasso(&[[1.0, 1.0], [5.0, 5.0]], false);
-        painting.brush(&[], 3.0, false);
+        assert!(!painting.brush(&[[-50.0, 10.0]], 3.0, false));
+        assert!(!painting.lasso(&[[1.0, 1.0], [5.0, 5.0]], false));
+        assert!(!painting.brush(&[], 3.0, false));
+        assert!(!painting.fill(true));
         assert_eq!((outside(&painting), painting.changed), (0, false));
     }
 }

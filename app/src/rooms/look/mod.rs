@@ -1,13 +1,15 @@
 //! The Look room: a solution's maps under any light.
 //!
 //! - [`view`]: the widget that draws maps; other rooms embed it
-//! - `opened`: a solution off the disk; `work`: the worker's part
+//! - `opened`: a solution off the disk; `capture`: the frames that it was solved from; `work`: the worker's part
 //! - `layer`: what can be shown; `lamp`: under which light
 //! - `canvas`: the maps with what is drawn over them, and the mouse; `legend`: scales
 //! - `side`: the panel beside them; `loupe`: the numbers of a photosite; `plots`: histogram and profile
 //! - [`slopes`], [`profile`], [`mask`]: the sums behind
 
 mod canvas;
+mod capture;
+mod edits;
 mod lamp;
 mod layer;
 mod legend;
@@ -21,7 +23,8 @@ pub mod slopes;
 pub mod view;
 mod work;
 
-pub use opened::{Capture, Opened};
+pub use capture::{Capture, Sources};
+pub use opened::Opened;
 pub use work::Frames;
 
 use crate::browse::Browse;
@@ -31,6 +34,7 @@ use crate::settings::SolveSettings;
 use crate::texts::look as texts;
 use crate::worker::{Command, Outbox, Tools};
 use crate::{theme, widgets};
+use edits::Edits;
 use eframe::egui::{self, RichText};
 use lamp::Lamp;
 use layer::Layers;
@@ -49,16 +53,16 @@ pub enum Ask {
     Open(PathBuf),
     /// Compare with the solution in this folder; the surface is the one that is looked at.
     Compare(PathBuf, Arc<Pyramid>),
-    /// What the frames of a light show, of this capture session.
-    Picture(PathBuf, usize),
+    /// What the frames of a light show.
+    Picture(Sources, usize),
     /// What a light measures over what the solution predicts.
-    Residual(PathBuf, usize),
+    Residual(Sources, usize),
     /// Solve one photosite again: which lights does it rest on?
-    Photosite(PathBuf, [usize; 2]),
+    Photosite(Sources, [usize; 2]),
     /// Save the mask of a capture session.
     Mask(PathBuf, Box<Image<bool>>),
-    /// Solve a capture session again and look at it.
-    Solve(PathBuf, SolveSettings),
+    /// Solve again, into the solution's folder, and look at it.
+    Solve(Sources, PathBuf, SolveSettings),
 }
 
 /// What the worker tells this room.
@@ -130,9 +134,10 @@ pub struct Look {
     /// What was asked of the worker and has not come yet.
     awaited: Option<Awaited>,
     taken: Option<Taken>,
-    line: Option<[[f64; 2]; 2]>,
+    line: Option<edits::Ends>,
     profile: Option<profile::Profile>,
     painting: Option<Painting>,
+    edits: Edits,
     path: String,
     browse: Browse,
 }
@@ -169,7 +174,7 @@ impl Look {
         self.keys(ui);
         egui::Panel::top("look head").show(ui, |ui| self.head(ui, desk));
         egui::Panel::right("look side")
-            .exact_size(280.0)
+            .exact_size(side::WIDTH)
             .resizable(false)
             .show(ui, |ui| self.side(ui, desk));
         if self.profile.is_some() || self.tool == Tool::Line {
@@ -215,20 +220,37 @@ impl Look {
         self.opened.as_deref()
     }
 
-    /// A new solution. The same one solved again keeps the place that is seen and the light.
+    /// A new solution. The same one solved again keeps how it is looked at, and what was drawn.
     fn take(&mut self, opened: Box<Opened>, desk: &mut Desk) {
-        let again = self.opened.as_ref().is_some_and(|old| old.folder == opened.folder);
-        let kept = again.then(|| std::mem::take(&mut self.view));
-        let lamp = again.then(|| self.lamp.clone());
-        *self = Self::default();
-        self.view = kept.unwrap_or_default();
-        self.lamp = lamp.unwrap_or_else(|| {
-            let mut lamp = Lamp::default();
-            lamp.hang_over(&opened.maps.geometry);
-            lamp
-        });
+        let old = std::mem::take(self);
+        let before = old.opened.as_ref().filter(|before| before.folder == opened.folder);
+        if before.is_some_and(|before| before.maps.size() == opened.maps.size()) {
+            self.view = old.view;
+            self.lamp = old.lamp;
+            self.layers = old.layers.of_one_solution();
+            (self.tool, self.canvas, self.line) = (old.tool, old.canvas, old.line);
+            (self.painting, self.edits) = (old.painting, old.edits);
+            self.keep_mask(&opened);
+        } else {
+            self.lamp.hang_over(&opened.maps.geometry);
+        }
         self.opened = Some(opened);
+        self.measure();
+        if matches!(self.tool, Tool::Brush | Tool::Lasso) && !self.can_mask() {
+            self.tool = Tool::Hand;
+        }
         desk.go_to(Room::Look);
+    }
+
+    /// The mask that was painted stays, with its steps, unless another one has taken its place.
+    fn keep_mask(&mut self, opened: &Opened) {
+        let of_disk = opened.capture().and_then(|capture| capture.mask.as_deref());
+        let stays = |painting: &mut Painting| {
+            painting.changed || of_disk.is_some_and(|mask| mask == painting.mask())
+        };
+        if self.painting.take_if(|painting| !stays(painting)).is_some() {
+            self.edits.forget_mask();
+        }
     }
 
     fn nothing_yet(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
@@ -281,16 +303,15 @@ impl Look {
     fn keys(&mut self, ui: &egui::Ui) {
         use egui::{Key, Modifiers};
         let pressed = |modifiers, key| ui.input_mut(|input| input.consume_key(modifiers, key));
-        if let Some(painting) = &mut self.painting {
-            // The one with more modifiers first: the other would take it too.
-            if pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) {
-                painting.redo();
-            } else if pressed(Modifiers::COMMAND, Key::Z) {
-                painting.undo();
-            }
-        }
-        if ui.ctx().memory(|memory| memory.focused().is_some()) {
+        // A text that is being written has its own.
+        if ui.ctx().text_edit_focused() {
             return;
+        }
+        // The one with more modifiers first: the other would take it too.
+        if pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) {
+            self.redo();
+        } else if pressed(Modifiers::COMMAND, Key::Z) {
+            self.undo();
         }
         if pressed(Modifiers::NONE, Key::F) {
             self.view.fit();
@@ -352,27 +373,25 @@ impl Look {
         if ui.button(texts::ONE_TO_ONE).on_hover_text(texts::ONE_TO_ONE_HINT).clicked() {
             self.view.one_to_one(ui.ctx());
         }
-        if let Some(painting) = &mut self.painting {
-            ui.separator();
-            let [undo, redo] = painting.steps();
-            let button = |name| egui::Button::new(name);
-            if ui.add_enabled(undo, button(texts::UNDO)).on_hover_text("Ctrl+Z").clicked() {
-                painting.undo();
-            }
-            if ui.add_enabled(redo, button(texts::REDO)).on_hover_text("Ctrl+Shift+Z").clicked() {
-                painting.redo();
-            }
+        ui.separator();
+        let [undo, redo] = self.edits.steps();
+        let button = |name| egui::Button::new(name);
+        if ui.add_enabled(undo, button(texts::UNDO)).on_hover_text(texts::UNDO_HINT).clicked() {
+            self.undo();
+        }
+        if ui.add_enabled(redo, button(texts::REDO)).on_hover_text(texts::REDO_HINT).clicked() {
+            self.redo();
         }
     }
 
     /// A mask belongs to the frames: it needs a capture session whose grid the maps share.
     fn can_mask(&self) -> bool {
-        self.opened.as_ref().is_some_and(|opened| opened.capture.is_some() && !opened.undistorted)
+        self.opened.as_ref().is_some_and(|opened| opened.capture().is_some())
     }
 
     /// Asks for a light's picture or residual where one is shown that is not there.
     fn await_layers(&mut self, desk: &mut Desk) {
-        let Some(capture) = self.opened.as_ref().and_then(|opened| opened.capture.as_ref()) else {
+        let Some(capture) = self.opened.as_ref().and_then(|opened| opened.capture()) else {
             return;
         };
         let light = self.lamp.light;
@@ -381,13 +400,13 @@ impl Look {
         }
         let there =
             |of: &Option<(usize, Arc<Pyramid>)>| of.as_ref().is_some_and(|of| of.0 == light);
-        let session = capture.session.clone();
+        let sources = capture.sources.clone();
         if self.layers.shows_frame() && !there(&self.picture) {
             self.awaited = Some(Awaited::Picture(light));
-            desk.ask(Command::Look(Ask::Picture(session, light)));
+            desk.ask(Command::Look(Ask::Picture(sources, light)));
         } else if self.layers.shows_residual() && !there(&self.residual) {
             self.awaited = Some(Awaited::Residual(light));
-            desk.ask(Command::Look(Ask::Residual(session, light)));
+            desk.ask(Command::Look(Ask::Residual(sources, light)));
         }
     }
 }

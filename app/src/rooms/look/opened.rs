@@ -1,17 +1,17 @@
 //! A solution taken off the disk, ready to be looked at.
 
+use super::capture::{Capture, capture_of};
 use super::slopes::{self, Distribution};
 use super::view::{Geometry, Maps, Pyramid, surface};
 use crate::place::Place;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use weavelight::files::{FileError, sha256_of_file};
+use weavelight::files::FileError;
 use weavelight::instrument::{CalibratedLight, Calibration};
-use weavelight::raster::{Exr, read_exr, read_mask};
-use weavelight::session::{MANIFEST, Session};
+use weavelight::raster::{Exr, read_exr};
 use weavelight::solution::{ALBEDO_EXR, CAMERA_TOML, CONFIDENCE_EXR, NORMAL_EXR, Solution};
-use weavelight_calibration::description::{Camera, Image, Plane};
+use weavelight_calibration::description::{Camera, Plane};
 
 /// A solution with what belongs to it.
 #[derive(Debug)]
@@ -30,25 +30,17 @@ pub struct Opened {
     pub warnings: Vec<String>,
     /// How it was solved, as the command line says it.
     pub method: String,
-    /// Whether the maps lie on a grid without the lens's distortion, which is not the frames' own.
-    pub undistorted: bool,
-    /// The frames that it was solved from, where they are still there.
-    pub capture: Option<Capture>,
+    /// The frames that it was solved from; or a sentence that says why they cannot be looked at.
+    pub frames: Result<Capture, String>,
     /// The rig's lights, where they are calibrated.
     pub lights: Vec<CalibratedLight>,
 }
 
-/// Where a solution comes from.
-#[derive(Clone, Debug)]
-pub struct Capture {
-    /// The capture session's folder.
-    pub session: PathBuf,
-    /// Lights that have a frame, ascending.
-    pub lights: Vec<usize>,
-    /// What is inside, row by row, where a mask says so.
-    pub mask: Option<Arc<Image<bool>>>,
-    /// Whether it is not any more what the solution was made from.
-    pub changed: bool,
+impl Opened {
+    /// The frames that it was solved from, where they can be looked at.
+    pub fn capture(&self) -> Option<&Capture> {
+        self.frames.as_ref().ok()
+    }
 }
 
 /// Why a solution cannot be looked at.
@@ -60,6 +52,12 @@ pub(super) enum OpenError {
     /// A picture is missing or broken.
     #[error(transparent)]
     Picture(#[from] weavelight::raster::FileError),
+    /// A map is not there.
+    #[error("{path} is missing, so that the solution is not whole; solve the scan again")]
+    Missing {
+        /// The file.
+        path: String,
+    },
     /// A map lacks a channel.
     #[error("{path} has no channel {channel}; solve the scan again")]
     Channel {
@@ -76,6 +74,18 @@ pub(super) enum OpenError {
         /// Its size.
         found: String,
         /// That of the normals.
+        expected: String,
+    },
+    /// A solution to compare with, of another size.
+    #[error(
+        "{name} is {found} and what you look at {expected}; only solutions of one size can be compared: solve both alike"
+    )]
+    Incomparable {
+        /// Its name.
+        name: String,
+        /// Its size.
+        found: String,
+        /// That of the solution that is looked at.
         expected: String,
     },
 }
@@ -103,6 +113,7 @@ pub(super) fn open(
     let [r, g, b] = channels(&albedo, &folder.join(ALBEDO_EXR), ["R", "G", "B"])?;
     let maps = Maps::over(surface, &|k| [r[k], g[k], b[k]], geometry);
     tell(0.9, "");
+    let frames = capture_of(folder, place, &report);
     Ok(Opened {
         name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         folder: folder.to_owned(),
@@ -110,13 +121,9 @@ pub(super) fn open(
         maps,
         mm_per_px: report.mm_per_px,
         warnings: report.warnings,
+        lights: lights_of(&frames, place),
         method: report.method,
-        undistorted: report.undistorted,
-        capture: place.and_then(|place| capture_of(folder, place, &report.inputs)),
-        lights: place
-            .and_then(|place| Calibration::load(&place.calibration()).ok())
-            .map(|calibration| calibration.lights)
-            .unwrap_or_default(),
+        frames,
     })
 }
 
@@ -135,6 +142,9 @@ pub(super) fn read_surface(folder: &Path) -> Result<Arc<Pyramid>, OpenError> {
 
 fn read_map(folder: &Path, name: &str, size: Option<[usize; 2]>) -> Result<Exr, OpenError> {
     let path = folder.join(name);
+    if !path.exists() {
+        return Err(OpenError::Missing { path: path.display().to_string() });
+    }
     let map = read_exr(&path)?;
     let found = [map.width, map.height];
     let words = |[width, height]: [usize; 2]| format!("{width} x {height}");
@@ -168,23 +178,10 @@ fn camera_of(folder: &Path) -> Result<Option<Camera>, FileError> {
     }
 }
 
-/// The capture session of the solution's name.
-fn capture_of(
-    folder: &Path,
-    place: &Place,
-    inputs: &[weavelight::files::Input],
-) -> Option<Capture> {
-    let session = place.scans().join(folder.file_name()?);
-    let read = Session::load(&session).ok()?;
-    let mut lights: Vec<usize> = read.frames.iter().filter_map(|frame| frame.light).collect();
-    lights.sort_unstable();
-    lights.dedup();
-    let hash = sha256_of_file(&session.join(MANIFEST)).ok();
-    let made_from = inputs.iter().find(|input| input.name == MANIFEST);
-    Some(Capture {
-        mask: read.mask_path().and_then(|path| read_mask(&path).ok()).map(Arc::new),
-        changed: made_from.is_some_and(|input| Some(&input.sha256) != hash.as_ref()),
-        session,
-        lights,
-    })
+/// The lights that the frames were solved with, else those of the rig that is open.
+fn lights_of(frames: &Result<Capture, String>, place: Option<&Place>) -> Vec<CalibratedLight> {
+    let of_frames = frames.as_ref().ok().map(|capture| capture.sources.calibration.clone());
+    let calibration = of_frames.or_else(|| place.map(Place::calibration));
+    let calibration = calibration.and_then(|folder| Calibration::load(&folder).ok());
+    calibration.map(|calibration| calibration.lights).unwrap_or_default()
 }

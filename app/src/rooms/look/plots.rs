@@ -8,7 +8,7 @@ use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, Sense, Ui, Widget
 use egui_plot::{HLine, Line, Plot, PlotPoints};
 
 /// Height of a histogram, points.
-const HISTOGRAM: f32 = 72.0;
+const HISTOGRAM: f32 = 56.0;
 
 /// A histogram with its figures.
 pub(super) fn histogram(ui: &mut Ui, name: &str, of: &Distribution) {
@@ -66,7 +66,8 @@ impl Look {
             curve(ui, size, texts::HEIGHT_ALONG, height);
         });
         if put_away {
-            (self.line, self.profile, self.tool) = (None, None, Tool::Hand);
+            self.set_line(None);
+            self.tool = Tool::Hand;
         }
     }
 }

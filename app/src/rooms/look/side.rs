@@ -6,14 +6,27 @@ use super::view::Compose;
 use super::{Ask, Look, Tool, plots};
 use crate::desk::Desk;
 use crate::texts::look as texts;
-use crate::theme;
+use crate::widgets::Sign;
 use crate::worker::Command;
-use eframe::egui::{self, Button, ComboBox, RichText, ScrollArea, Slider, Ui};
+use eframe::egui::{self, Button, ComboBox, Response, RichText, ScrollArea, Slider, Ui, vec2};
+
+/// Width of the panel, points.
+pub(super) const WIDTH: f32 = 296.0;
+/// Width of the names at the left, which the controls stand right of.
+const NAME: f32 = 72.0;
+/// Width of a slider's value.
+const VALUE: f32 = 66.0;
+/// Height of a row of controls: all that relighting takes is seen at once in a window of 1280 x 800.
+const ROW: f32 = 24.0;
 
 impl Look {
     pub(super) fn side(&mut self, ui: &mut Ui, desk: &mut Desk) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            ui.spacing_mut().slider_width = 110.0;
+            let spacing = ui.spacing_mut();
+            spacing.interact_size = vec2(VALUE, ROW);
+            spacing.button_padding = vec2(8.0, 3.0);
+            spacing.item_spacing = vec2(4.0, 4.0);
+            ui.add_space(4.0);
             self.layers_section(ui);
             self.light_section(ui);
             if self.painting.is_some() || matches!(self.tool, Tool::Brush | Tool::Lasso) {
@@ -29,28 +42,36 @@ impl Look {
     }
 
     fn layers_section(&mut self, ui: &mut Ui) {
-        section(ui, texts::SHOW, |ui| {
-            ui.horizontal(|ui| {
-                let ways = [Compose::Single, Compose::Split, Compose::Difference];
-                for (compose, name) in ways.into_iter().zip(texts::COMPOSE) {
-                    ui.selectable_value(&mut self.layers.compose, compose, name);
-                }
-            });
-            let sides = self.layers.seen().len();
-            for k in 0..sides {
-                let name = if sides == 1 { texts::MAP } else { texts::SIDES[k] };
-                self.layer_choice(ui, k, name);
+        named(ui, RichText::new(texts::SHOW).strong(), |ui, _| {
+            let ways = [Compose::Single, Compose::Split, Compose::Difference];
+            for (compose, name) in ways.into_iter().zip(texts::COMPOSE) {
+                ui.selectable_value(&mut self.layers.compose, compose, name);
             }
-            self.scale_of_layers(ui);
+        });
+        let sides = self.layers.seen().len();
+        for k in 0..sides {
+            let name = if sides == 1 { texts::MAP } else { texts::SIDES[k] };
+            self.layer_choice(ui, k, name);
+        }
+        self.scale_of_layers(ui);
+        self.why_no_frames(ui);
+        rule(ui);
+    }
+
+    /// Where the frames cannot be looked at: that, why, and what to do.
+    fn why_no_frames(&self, ui: &mut Ui) {
+        let Some(Err(why)) = self.opened.as_ref().map(|opened| &opened.frames) else { return };
+        ui.horizontal_top(|ui| {
+            Sign::Warning.ui(ui);
+            let text = RichText::new(format!("{}. {why}", texts::FRAMES_MISSING)).size(12.0);
+            ui.add(egui::Label::new(text).wrap());
         });
     }
 
     fn layer_choice(&mut self, ui: &mut Ui, k: usize, name: &str) {
-        ui.horizontal(|ui| {
-            let label = ui.label(name);
-            let mut chosen = self.layers.sides[k];
-            let width = ui.available_width() - 8.0;
-            let choice = ComboBox::from_id_salt(("layer", k)).width(width);
+        let mut chosen = self.layers.sides[k];
+        named(ui, name, |ui, label| {
+            let choice = ComboBox::from_id_salt(("layer", k)).width(ui.available_width());
             let shown = choice.selected_text(chosen.name()).show_ui(ui, |ui| {
                 for layer in Layer::ALL {
                     let why_not = self.why_not(layer);
@@ -61,9 +82,9 @@ impl Look {
                     }
                 }
             });
-            shown.response.labelled_by(label.id);
-            self.layers.sides[k] = chosen;
+            shown.response.labelled_by(label);
         });
+        self.layers.sides[k] = chosen;
     }
 
     /// The upper ends of the scales that are seen.
@@ -74,23 +95,24 @@ impl Look {
             [Layer::Error, Layer::Slope, Layer::Angle, Layer::Residual].map(seen);
         let difference = layers.compose == Compose::Difference;
         let scales = &mut self.layers.scales;
-        let degrees = |value, range| Slider::new(value, range).suffix("°").text(texts::UP_TO);
+        let degrees = |value, range| Slider::new(value, range).suffix("°");
+        let up_to = texts::UP_TO;
         if error {
-            ui.add(degrees(&mut scales.error_deg, 0.5..=30.0).logarithmic(true));
+            slider(ui, up_to, degrees(&mut scales.error_deg, 0.5..=30.0).logarithmic(true));
         }
         if slope {
-            ui.add(degrees(&mut scales.slope_deg, 5.0..=90.0));
+            slider(ui, up_to, degrees(&mut scales.slope_deg, 5.0..=90.0));
         }
         if angle {
-            ui.add(degrees(&mut scales.angle_deg, 0.1..=45.0).logarithmic(true));
+            slider(ui, up_to, degrees(&mut scales.angle_deg, 0.1..=45.0).logarithmic(true));
         }
         if residual {
             let range = 0.002..=0.5;
-            ui.add(Slider::new(&mut scales.residual, range).logarithmic(true).text(texts::UP_TO));
+            slider(ui, up_to, Slider::new(&mut scales.residual, range).logarithmic(true));
         }
         if difference {
             let range = 0.01..=1.0;
-            ui.add(Slider::new(&mut scales.difference, range).logarithmic(true).text(texts::UP_TO));
+            slider(ui, up_to, Slider::new(&mut scales.difference, range).logarithmic(true));
         }
     }
 
@@ -101,52 +123,51 @@ impl Look {
         if !bright {
             return;
         }
-        section(ui, texts::LIGHT, |ui| {
+        named(ui, RichText::new(texts::LIGHT).strong(), |ui, _| {
             if relit {
                 self.kind_of_light(ui);
             }
-            match self.lamp.kind {
-                Kind::Lamp if relit => self.lamp_controls(ui),
-                Kind::Sun if relit => self.sun_controls(ui),
-                _ => {}
-            }
-            if of_frames || (relit && self.lamp.kind == Kind::Rig) {
-                self.rig_lights(ui);
-            }
-            let stops = Slider::new(&mut self.lamp.stops, -4.0..=4.0).suffix(" EV");
-            ui.add(stops.fixed_decimals(1).text(texts::BRIGHTNESS));
-            if relit {
-                let gloss = Slider::new(&mut self.lamp.gloss, 0.0..=0.2);
-                ui.add(gloss.fixed_decimals(2).text(texts::GLOSS));
-            }
         });
+        match self.lamp.kind {
+            Kind::Lamp if relit => self.lamp_controls(ui),
+            Kind::Sun if relit => self.sun_controls(ui),
+            _ => {}
+        }
+        if of_frames || (relit && self.lamp.kind == Kind::Rig) {
+            self.rig_lights(ui);
+        }
+        let stops = Slider::new(&mut self.lamp.stops, -4.0..=4.0).suffix(" EV");
+        slider(ui, texts::BRIGHTNESS, stops.fixed_decimals(1));
+        if relit {
+            let gloss = Slider::new(&mut self.lamp.gloss, 0.0..=0.2);
+            slider(ui, texts::GLOSS, gloss.fixed_decimals(2));
+        }
+        rule(ui);
     }
 
     fn kind_of_light(&mut self, ui: &mut Ui) {
         let calibrated = self.opened.as_ref().is_some_and(|opened| !opened.lights.is_empty());
-        ui.horizontal(|ui| {
-            for (kind, name) in [Kind::Lamp, Kind::Sun, Kind::Rig].into_iter().zip(texts::LIGHTS) {
-                let enabled = kind != Kind::Rig || calibrated;
-                let button = Button::selectable(self.lamp.kind == kind, name);
-                let button = ui.add_enabled(enabled, button);
-                if button.on_disabled_hover_text(texts::NO_LIGHTS).clicked() {
-                    self.lamp.kind = kind;
-                }
+        for (kind, name) in [Kind::Lamp, Kind::Sun, Kind::Rig].into_iter().zip(texts::LIGHTS) {
+            let enabled = kind != Kind::Rig || calibrated;
+            let button = Button::selectable(self.lamp.kind == kind, name);
+            let button = ui.add_enabled(enabled, button);
+            if button.on_disabled_hover_text(texts::NO_LIGHTS).clicked() {
+                self.lamp.kind = kind;
             }
-        });
+        }
     }
 
     fn lamp_controls(&mut self, ui: &mut Ui) {
         let height = Slider::new(&mut self.lamp.height_mm, 5.0..=2000.0).logarithmic(true);
-        ui.add(height.suffix(" mm").fixed_decimals(0).text(texts::HEIGHT));
+        slider(ui, texts::HEIGHT, height.suffix(" mm").fixed_decimals(0));
         ui.label(RichText::new(texts::DRAG_LAMP).weak().small());
     }
 
     fn sun_controls(&mut self, ui: &mut Ui) {
         let elevation = Slider::new(&mut self.lamp.elevation_deg, 1.0..=90.0).suffix("°");
-        ui.add(elevation.fixed_decimals(0).text(texts::ELEVATION));
+        slider(ui, texts::ELEVATION, elevation.fixed_decimals(0));
         let azimuth = Slider::new(&mut self.lamp.azimuth_deg, 0.0..=360.0).suffix("°");
-        ui.add(azimuth.fixed_decimals(0).text(texts::AZIMUTH));
+        slider(ui, texts::AZIMUTH, azimuth.fixed_decimals(0));
         ui.checkbox(&mut self.lamp.moves, texts::MOVES);
     }
 
@@ -154,22 +175,26 @@ impl Look {
     fn rig_lights(&mut self, ui: &mut Ui) {
         let Some(opened) = &self.opened else { return };
         let count = opened.lights.len();
-        let has_frame =
-            opened.capture.as_ref().is_some_and(|c| c.lights.contains(&self.lamp.light));
+        let capture = opened.capture();
+        let has_frame = capture.is_some_and(|c| c.lights.contains(&self.lamp.light));
+        let mut chosen = self.lamp.light;
         ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing = egui::vec2(4.0, 4.0);
-            ui.spacing_mut().button_padding.x = 6.0;
+            ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+            ui.spacing_mut().button_padding.x = 2.0;
+            // Ten in a row.
+            let size = vec2((ui.available_width() - 9.0 * 3.0) / 10.0 - 0.5, ROW);
             for light in 0..count {
-                let button = Button::selectable(self.lamp.light == light, light.to_string());
-                let button = ui.add(button.min_size(egui::vec2(26.0, 24.0)));
-                if button.on_hover_text(texts::light(light)).clicked() {
-                    self.lamp.light = light;
+                let button = Button::selectable(chosen == light, light.to_string());
+                if ui.add(button.min_size(size)).on_hover_text(texts::light(light)).clicked() {
+                    chosen = light;
                 }
             }
         });
         let why_not = self.why_not(Layer::Frame).or((!has_frame).then_some(texts::NO_FRAME));
         let beside = ui.add_enabled(why_not.is_none(), Button::new(texts::BESIDE_FRAME));
-        if beside.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
+        let beside = beside.on_disabled_hover_text(why_not.unwrap_or_default()).clicked();
+        self.lamp.light = chosen;
+        if beside {
             self.lamp.kind = Kind::Rig;
             self.layers.sides = [Layer::Relit, Layer::Frame];
             self.layers.compose = Compose::Split;
@@ -177,40 +202,38 @@ impl Look {
     }
 
     fn mask_section(&mut self, ui: &mut Ui, desk: &mut Desk) {
-        section(ui, texts::MASK, |ui| {
-            ui.horizontal(|ui| {
-                ui.selectable_value(&mut self.canvas.erases, false, texts::KEEP);
-                ui.selectable_value(&mut self.canvas.erases, true, texts::LEAVE_OUT);
-            });
-            let Some(opened) = &self.opened else { return };
-            let size = opened.maps.size();
-            let mut radius = self.canvas.radius_px(size);
-            let most = (size[0] as f64 / 4.0).max(2.0);
-            let slider = Slider::new(&mut radius, 0.5..=most).logarithmic(true).suffix(" px");
-            if ui.add(slider.fixed_decimals(0).text(texts::BRUSH)).changed() {
-                self.canvas.brush_px = radius;
-            }
-            let (Some(painting), Some(capture)) = (&mut self.painting, &opened.capture) else {
-                return;
-            };
-            ui.horizontal(|ui| {
-                if ui.button(texts::ALL).clicked() {
-                    painting.fill(true);
-                }
-                if ui.button(texts::NONE).clicked() {
-                    painting.fill(false);
-                }
-            });
-            let session = capture.session.clone();
-            let something = painting.mask().data.contains(&true);
-            let ready = painting.changed && something && !desk.is_busy();
-            let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
-            if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
-                let mask = Box::new(painting.mask().clone());
-                desk.ask(Command::Look(Ask::Mask(session.clone(), mask)));
-                desk.ask(Command::Look(Ask::Solve(session, desk.settings.solve)));
+        named(ui, RichText::new(texts::MASK).strong(), |ui, _| {
+            ui.selectable_value(&mut self.canvas.erases, false, texts::KEEP);
+            ui.selectable_value(&mut self.canvas.erases, true, texts::LEAVE_OUT);
+        });
+        let Some(opened) = &self.opened else { return };
+        let size = opened.maps.size();
+        let mut radius = self.canvas.radius_px(size);
+        let most = (size[0] as f64 / 4.0).max(2.0);
+        let brush = Slider::new(&mut radius, 0.5..=most).logarithmic(true).suffix(" px");
+        if slider(ui, texts::BRUSH, brush.fixed_decimals(0)).changed() {
+            self.canvas.brush_px = radius;
+        }
+        let (Some(painting), Some(capture)) = (&mut self.painting, opened.capture()) else {
+            return rule(ui);
+        };
+        ui.horizontal(|ui| {
+            let all = ui.button(texts::ALL).clicked() && painting.fill(true);
+            let none = ui.button(texts::NONE).clicked() && painting.fill(false);
+            if all || none {
+                self.edits.changed_mask();
             }
         });
+        let something = painting.mask().data.contains(&true);
+        let ready = painting.changed && something && !desk.is_busy();
+        let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
+        if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
+            let (sources, mask) = (capture.sources.clone(), Box::new(painting.mask().clone()));
+            desk.ask(Command::Look(Ask::Mask(sources.session.clone(), mask)));
+            let folder = opened.folder.clone();
+            desk.ask(Command::Look(Ask::Solve(sources, folder, desk.settings.solve)));
+        }
+        rule(ui);
     }
 
     fn other_section(&self, ui: &mut Ui) {
@@ -225,9 +248,35 @@ impl Look {
 }
 
 fn section(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {
-    ui.add_space(theme::GAP);
     ui.label(RichText::new(title).strong());
     contents(ui);
-    ui.add_space(theme::GAP / 2.0);
-    ui.separator();
+    rule(ui);
+}
+
+/// The end of a section.
+fn rule(ui: &mut Ui) {
+    ui.add(egui::Separator::default().spacing(10.0));
+}
+
+/// A name with controls right of it, aligned with those above and below. They are handed the name's id, to be labelled by.
+fn named<R>(
+    ui: &mut Ui,
+    name: impl Into<egui::WidgetText>,
+    controls: impl FnOnce(&mut Ui, egui::Id) -> R,
+) -> R {
+    ui.horizontal(|ui| {
+        let start = ui.cursor().left();
+        let label = ui.label(name);
+        ui.add_space((start + NAME - ui.cursor().left()).max(0.0));
+        controls(ui, label.id)
+    })
+    .inner
+}
+
+/// A slider with its name and value.
+fn slider(ui: &mut Ui, name: &str, slider: Slider) -> Response {
+    named(ui, name, |ui, label| {
+        ui.spacing_mut().slider_width = ui.available_width() - VALUE - ui.spacing().item_spacing.x;
+        ui.add(slider).labelled_by(label)
+    })
 }

@@ -2,11 +2,11 @@
 
 use super::opened::{self, OpenError};
 use super::view::{Pyramid, picture};
-use super::{Ask, Told, slopes};
+use super::{Ask, Sources, Told, slopes};
 use crate::settings::SolveSettings;
 use crate::texts::look as texts;
 use crate::worker::{Outbox, Tools, Update};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use weavelight::files::FileError;
 use weavelight::photometry::Method;
@@ -19,7 +19,7 @@ use weavelight_calibration::description::Image;
 /// The frames that were looked at last, decoded.
 #[derive(Debug, Default)]
 pub struct Frames {
-    session: PathBuf,
+    sources: Sources,
     scene: Option<Box<Scene>>,
 }
 
@@ -27,11 +27,11 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
     match ask {
         Ask::Open(folder) => open(&folder, tools, out),
         Ask::Compare(folder, with) => compare(&folder, &with, out),
-        Ask::Picture(session, light) => look_at(&session, light, Kind::Picture, tools, out),
-        Ask::Residual(session, light) => look_at(&session, light, Kind::Residual, tools, out),
-        Ask::Photosite(session, at) => photosite(&session, at, tools, out),
+        Ask::Picture(sources, light) => look_at(&sources, light, Kind::Picture, tools, out),
+        Ask::Residual(sources, light) => look_at(&sources, light, Kind::Residual, tools, out),
+        Ask::Photosite(sources, at) => photosite(&sources, at, tools, out),
         Ask::Mask(session, mask) => save_mask(&session, &mask, tools, out),
-        Ask::Solve(session, settings) => solve(&session, settings, tools, out),
+        Ask::Solve(sources, solution, settings) => solve(&sources, &solution, settings, tools, out),
     }
 }
 
@@ -51,8 +51,8 @@ fn compare(folder: &Path, with: &Arc<Pyramid>, out: &Outbox) {
         let surface = opened::read_surface(folder)?;
         match surface.size() == with.size() {
             true => Ok(surface),
-            false => Err(OpenError::Size {
-                path: folder.display().to_string(),
+            false => Err(OpenError::Incomparable {
+                name: name.clone(),
                 found: texts::size(surface.size()),
                 expected: texts::size(with.size()),
             }),
@@ -71,13 +71,13 @@ enum Kind {
     Residual,
 }
 
-fn look_at(session: &Path, light: usize, kind: Kind, tools: &mut Tools, out: &Outbox) {
+fn look_at(sources: &Sources, light: usize, kind: Kind, tools: &mut Tools, out: &Outbox) {
     let title = match kind {
         Kind::Picture => texts::frame_of(light),
         Kind::Residual => texts::residual_of(light),
     };
     let made = out.job(&title, || {
-        let scene = scene(session, tools, out)?;
+        let scene = scene(sources, tools, out)?;
         out.tick(0.5, &title);
         let position = scene.lights.iter().position(|of| of.index == light);
         let Some(position) = position else { return Ok(None) };
@@ -103,13 +103,13 @@ fn of_residual(image: &Image<f32>) -> Arc<Pyramid> {
     picture([image.width, image.height], &|k| [image.data[k]; 3], &known)
 }
 
-fn photosite(session: &Path, at: [usize; 2], tools: &mut Tools, out: &Outbox) {
+fn photosite(sources: &Sources, at: [usize; 2], tools: &mut Tools, out: &Outbox) {
     let solve = |tools: &mut Tools| {
-        let scene = scene(session, tools, out)?;
+        let scene = scene(sources, tools, out)?;
         Rows::with_method(scene, Method::Auto, |rows| rows.photosite(at))
     };
     // Once the frames are there, a click is answered at once.
-    let known = tools.frames.scene.is_some() && tools.frames.session == session;
+    let known = tools.frames.scene.is_some() && tools.frames.sources == *sources;
     let found = match known {
         true => solve(tools).ok(),
         false => out.job(texts::READING_FRAMES, || solve(tools)).ok(),
@@ -118,17 +118,20 @@ fn photosite(session: &Path, at: [usize; 2], tools: &mut Tools, out: &Outbox) {
 }
 
 /// The frames of a capture session; those of the last one are kept.
-fn scene<'t>(session: &Path, tools: &'t mut Tools, out: &Outbox) -> Result<&'t Scene, SolveError> {
+fn scene<'t>(
+    sources: &Sources,
+    tools: &'t mut Tools,
+    out: &Outbox,
+) -> Result<&'t Scene, SolveError> {
     let frames = &mut tools.frames;
-    if frames.session != session {
-        *frames = Frames { session: session.to_owned(), scene: None };
+    if frames.sources != *sources {
+        *frames = Frames { sources: sources.clone(), scene: None };
     }
     let scene = match frames.scene.take() {
         Some(scene) => scene,
         None => {
             out.tick(0.1, texts::READING_FRAMES);
-            let calibration = tools.place.as_ref().map(crate::place::Place::calibration);
-            let (scene, _) = load_scene(session, &calibration.unwrap_or_default())?;
+            let (scene, _) = load_scene(&sources.session, &sources.calibration)?;
             Box::new(scene)
         }
     };
@@ -160,16 +163,20 @@ fn save_mask(session: &Path, mask: &Image<bool>, tools: &mut Tools, out: &Outbox
 }
 
 /// The same call with the same settings as the command line's, and then its solution is looked at.
-fn solve(session: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) {
-    let Some(place) = &tools.place else { return };
+fn solve(
+    Sources { session, calibration }: &Sources,
+    solution: &Path,
+    settings: SolveSettings,
+    tools: &mut Tools,
+    out: &Outbox,
+) {
     let name = session.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let solution = place.solution(session);
-    let options = settings.options(session, &place.calibration(), &solution);
+    let options = settings.options(session, calibration, solution);
     let solved = out.job(&texts::solving(&name), || {
         let page = |shown: &Shown| page_of_solve(shown, None);
         run_with_page(&options, &|state| out.tick(state.share(), state.stage.what()), Some(&page))
     });
     if solved.is_ok() {
-        open(&solution, tools, out);
+        open(solution, tools, out);
     }
 }

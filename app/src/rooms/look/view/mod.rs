@@ -24,7 +24,10 @@ pub use pyramid::{Pyramid, Texel};
 pub use viewport::Viewport;
 
 use crate::texts::look as texts;
-use eframe::egui::{self, Color32, Id, PointerButton, Rect, Response, Role, Sense, WidgetInfo};
+use crate::widgets::Sign;
+use eframe::egui::{
+    self, Color32, Id, PointerButton, Rect, Response, Role, Sense, WidgetInfo, vec2,
+};
 use eframe::egui_wgpu::Callback;
 
 /// What a view remembers: which part is seen.
@@ -65,6 +68,11 @@ impl Shown {
         let at = self.response.hover_pos().or(self.response.interact_pointer_pos())?;
         Some(self.viewport.pixel_at(at, self.rect))
     }
+}
+
+/// Whether there is a renderer to draw maps with; where not, a view says so and shows none.
+pub fn can_draw(ctx: &egui::Context) -> bool {
+    gpu::renderer(ctx).is_some()
 }
 
 impl MapView {
@@ -144,16 +152,26 @@ fn navigate(
     *viewport != before
 }
 
-fn paint(ui: &egui::Ui, rect: Rect, response: &Response, viewport: Viewport, canvas: &Canvas) {
+/// There is nothing to draw maps with: that, and the remedy.
+fn say_no_graphics(ui: &mut egui::Ui, rect: Rect) {
+    let size = vec2(rect.width().min(460.0), rect.height().min(64.0));
+    let card = Rect::from_center_size(rect.center(), size);
+    ui.painter().rect_filled(card, 6.0, ui.visuals().panel_fill);
+    let inside = egui::UiBuilder::new().max_rect(card.shrink(14.0));
+    ui.scope_builder(inside, |ui| {
+        ui.horizontal_top(|ui| {
+            Sign::Bad.ui(ui);
+            ui.add(egui::Label::new(texts::NO_GRAPHICS).wrap());
+        });
+    });
+}
+
+fn paint(ui: &mut egui::Ui, rect: Rect, response: &Response, viewport: Viewport, canvas: &Canvas) {
     // Neutral, and not so bright that it blinds the eye to the cloth.
     let ground = Color32::from_gray(if ui.visuals().dark_mode { 20 } else { 200 });
     ui.painter().rect_filled(rect, 0.0, ground);
     let Some(renderer) = gpu::renderer(ui.ctx()) else {
-        let font = egui::TextStyle::Body.resolve(ui.style());
-        let color = ui.visuals().text_color();
-        let at = rect.center();
-        ui.painter().text(at, egui::Align2::CENTER_CENTER, texts::NO_GRAPHICS, font, color);
-        return;
+        return say_no_graphics(ui, rect);
     };
     let screen = (rect.size(), ui.ctx().pixels_per_point());
     let uniform = shade::uniform(
