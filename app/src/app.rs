@@ -87,7 +87,11 @@ impl App {
                     (activity.share, activity.step, activity.left) = (share, step, left);
                 }
             }
-            Update::Ended => desk.activity = None,
+            Update::Ended => {
+                desk.activity = None;
+                self.scans.is_stale();
+                self.rig.is_stale();
+            }
             Update::Problem(problem) => desk.tell(problem),
             Update::GoTo(room) => desk.go_to(room),
             Update::Opened(place) => {
@@ -137,7 +141,7 @@ impl App {
             self.rig.leave(&mut self.desk);
         }
         if self.shown == Some(Room::Calibrate) {
-            self.calibrate.leave();
+            self.calibrate.leave(&mut self.desk);
         }
         if open == Some(Room::Scans) {
             self.scans.is_stale();

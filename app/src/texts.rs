@@ -411,6 +411,8 @@ pub mod scans {
 
     /// The field.
     pub const SEARCH: &str = "Search by name";
+    /// Until they are there.
+    pub const LISTING: &str = "Looking what there is…";
     /// The empty room.
     pub const NONE: &str = "No scans yet";
     /// The empty room.

@@ -5,6 +5,7 @@ use crate::laboratory::{
 };
 use crate::simboard::SimBoard;
 use crate::table::{Case, cases};
+use rustix::process::{Pid, Signal, kill_process};
 use serialport::SerialPort;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -420,13 +421,10 @@ fn stopped(laboratory: &Laboratory) -> Result<Summary, String> {
         std::thread::sleep(Duration::from_millis(5));
     }
     std::thread::sleep(Duration::from_millis(150));
-    let signal = |name: &str| {
-        let status = Command::new("kill").args([name, &child.id().to_string()]).status();
-        assert!(status.unwrap().success());
-    };
-    signal("-STOP");
+    let signal = |signal| kill_process(Pid::from_child(&child), signal).unwrap();
+    signal(Signal::STOP);
     std::thread::sleep(Duration::from_secs(2));
-    signal("-CONT");
+    signal(Signal::CONT);
     let mut said = String::new();
     child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
     if !child.wait().unwrap().success() {

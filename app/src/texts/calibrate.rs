@@ -11,6 +11,10 @@ pub const FIT: &str = "Calculate (Space)";
 pub const LOOK: &str = "Live";
 /// What that does.
 pub const LOOK_HINT: &str = "Looks again and again, with what is found drawn over the picture, until it is switched off; nothing is kept";
+/// Where that was ended.
+pub const NOT_LOOKED: &str = "Nobody has looked at the pictures of this rig's calibration yet";
+/// The way out.
+pub const LOOK_NOW: &str = "Look at them";
 /// The button that goes on by itself.
 pub const AUTO: &str = "Do the rest by itself";
 /// What that does.
@@ -364,6 +368,11 @@ pub fn better(action: &Action, begun: bool, checked: bool) -> String {
             step(Step::Check)
         ),
     }
+}
+
+/// Which picture is looked at.
+pub fn picture_of(k: usize, session: &weavelight::session::Session) -> String {
+    format!("picture {} of {}", k + 1, session.frames.len())
 }
 
 /// What comes after a calibration.

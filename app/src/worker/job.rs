@@ -43,7 +43,8 @@ impl Brake {
         }
     }
 
-    fn is_cancelled(&self) -> bool {
+    /// Whether the work under way is no longer wanted.
+    pub(super) fn is_cancelled(&self) -> bool {
         self.0.cancelled.load(Ordering::SeqCst)
     }
 }
@@ -90,6 +91,11 @@ impl Outbox {
             resume_unwind(Box::new(Cancelled));
         }
         self.progress(share, step, None);
+    }
+
+    /// Whether the command under way is no longer wanted.
+    pub fn is_cancelled(&self) -> bool {
+        self.brake.is_cancelled()
     }
 
     /// Tells how far work is.

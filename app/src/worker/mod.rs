@@ -1,4 +1,5 @@
-//! The one thread that owns devices and solver. Commands come in, updates go out; the window never waits for it.
+//! The one thread that owns devices and solver. Commands come in, updates go out; the window never waits for it. A second one
+//! reads what lies on the disk, so that scans are listed while another is taken.
 //!
 //! Work that the user no longer wants is ended by unwinding from its progress callback, as rust-analyzer ends its queries:
 //! the library's outputs appear only when whole, so nothing half-written stays.
@@ -39,6 +40,19 @@ pub enum Command {
     Look(look::Ask),
     /// Of the Scans room.
     Scans(scans::Ask),
+}
+
+impl Command {
+    /// Whether it needs neither devices nor the solver, and says itself of which rig it is.
+    fn only_reads(&self) -> bool {
+        match self {
+            Command::Rig(ask) => matches!(ask, rig::Ask::ReadCalibration(_)),
+            Command::Scans(ask) => {
+                matches!(ask, scans::Ask::List(_) | scans::Ask::Thumbnail(..))
+            }
+            _ => false,
+        }
+    }
 }
 
 /// What has happened.
@@ -94,6 +108,8 @@ pub struct Tools {
 #[derive(Debug)]
 pub struct Worker {
     commands: Sender<Command>,
+    /// Those that only read.
+    readings: Sender<Command>,
     updates: Receiver<Update>,
     /// Commands that are not done yet.
     open: Arc<AtomicUsize>,
@@ -105,10 +121,18 @@ impl Worker {
     /// Starts the thread; it ends with this value, after what it is doing. `ctx` is woken for every update.
     pub fn start(ctx: egui::Context) -> Self {
         let (commands, inbox) = mpsc::channel();
+        let (readings, to_read) = mpsc::channel();
         let (outbox, updates) = mpsc::channel();
         let brake = job::Brake::default();
         let out = Outbox::new(outbox, ctx, brake.clone());
         let open = Arc::new(AtomicUsize::new(0));
+        let (reader, read) = (out.clone(), open.clone());
+        std::thread::spawn(move || {
+            for command in to_read {
+                act(command, &mut Tools::default(), &reader);
+                read.fetch_sub(1, Ordering::SeqCst);
+            }
+        });
         let done = open.clone();
         std::thread::spawn(move || {
             let mut tools = Tools::default();
@@ -118,14 +142,15 @@ impl Worker {
                 done.fetch_sub(1, Ordering::SeqCst);
             }
         });
-        Self { commands, updates, open, brake }
+        Self { commands, readings, updates, open, brake }
     }
 
     /// Hands over a command.
     pub fn ask(&self, command: Command) {
         self.open.fetch_add(1, Ordering::SeqCst);
-        // The thread lives as long as this value.
-        let _ = self.commands.send(command);
+        let to = if command.only_reads() { &self.readings } else { &self.commands };
+        // The threads live as long as this value.
+        let _ = to.send(command);
     }
 
     /// Whether every command is done.

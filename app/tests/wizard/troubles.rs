@@ -64,8 +64,9 @@ fn a_board_that_is_not_seen_is_told_beside_the_picture() {
         |window| {
             // Squares of a few pixels.
             super::make_uncalibrated(window, [60, 40]);
-            window.click("Look first");
-            window.until("the picture is there", |app| app.is_idle());
+            window.click("Live");
+            window.until_label(weavelight_app::texts::calibrate::BOARD_NOT_FOUND);
+            window.click("Live");
             window.idle();
             assert_eq!(window.says("The board was not found"), 1);
         },
@@ -97,7 +98,7 @@ fn what_went_wrong_stays_until_the_next_try() {
         rig.replacen("kind = \"simulated\"", watched, 1)
     });
     window.until_label("Lay the chessboard flat in the middle");
-    window.click("Look first");
+    window.click("Live");
     window.idle();
     assert_eq!(
         window.says("the watched folder"),

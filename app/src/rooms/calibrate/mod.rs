@@ -21,8 +21,8 @@ use crate::browse::Browse;
 use crate::desk::{Brake, Desk, Severity};
 use crate::rooms::Room;
 use crate::texts::calibrate as texts;
-use crate::theme;
 use crate::worker::{Command, Ended, Outbox, Tools};
+use crate::{theme, widgets};
 use eframe::egui;
 use std::path::PathBuf;
 use weavelight::calibrate::{CameraReport, CheckReport, ColorReport, LightsReport};
@@ -79,6 +79,8 @@ pub enum Told {
 pub struct Calibrate {
     state: Option<Box<State>>,
     asked: bool,
+    /// The first look at what is there was ended.
+    stopped: bool,
     /// Go on by itself, on the simulated rig.
     auto: bool,
     live: Live,
@@ -110,6 +112,12 @@ impl Calibrate {
         if !self.asked {
             self.asked = true;
             desk.ask(Command::Calibrate(Ask::Refresh));
+        }
+        if self.stopped {
+            if widgets::empty(ui, texts::NOT_LOOKED, texts::LOOK_NOW) {
+                self.reset();
+            }
+            return;
         }
         let pane = egui::Panel::left("calibration steps").exact_size(292.0).resizable(false);
         pane.show(ui, |ui| {
@@ -207,7 +215,7 @@ impl Calibrate {
             let size = egui::vec2(220.0, theme::BIG);
             // While it looks, the picture that is wanted comes right after.
             let free_to_go = !busy || (self.live.on && !self.live.taking);
-            let clicked = crate::widgets::primary(ui, text, size, free_to_go).clicked();
+            let clicked = widgets::primary(ui, text, size, free_to_go).clicked();
             let free = !ui.ctx().egui_wants_keyboard_input();
             let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
             if (clicked || space) && free_to_go {
@@ -249,8 +257,14 @@ impl Calibrate {
     }
 
     /// Nobody sees the pictures any more.
-    pub fn leave(&mut self) {
+    pub fn leave(&mut self, desk: &mut Desk) {
         self.live.on = false;
+        // The first look at all the pictures takes its time, and no other room wants to wait for it.
+        let looking = desk.activity.as_ref().is_some_and(|now| now.title == texts::LOOKING);
+        if looking && self.state.is_none() {
+            desk.brake(Brake::Cancel);
+            self.asked = false;
+        }
     }
 
     fn go(&mut self, task: Task, desk: &mut Desk) {
@@ -272,6 +286,7 @@ impl Calibrate {
                 self.checking &= state.verdict.is_none() && task == Task::Done;
                 self.state = Some(state);
                 self.live.taking = false;
+                self.stopped = false;
                 match (self.auto, task) {
                     (true, Task::Done | Task::Fit(_)) => self.auto = false,
                     (true, task) => self.go(task, desk),
@@ -292,6 +307,7 @@ impl Calibrate {
             Told::Halted(ended) => {
                 self.auto = false;
                 self.live = Live::default();
+                self.stopped = self.state.is_none();
                 // The error was put up just before.
                 let newest = desk.problems.iter().rev().find(|it| it.severity == Severity::Error);
                 let newest = newest.filter(|_| ended == Ended::Failed);

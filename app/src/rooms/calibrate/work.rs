@@ -54,9 +54,10 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         out.tell(Update::Calibrate(Told::Halted(ended)));
     }
     let state = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
-    if let Ok(state) = state {
-        out.tell(Update::Calibrate(Told::State(Box::new(state))));
-    }
+    out.tell(Update::Calibrate(match state {
+        Ok(state) => Told::State(Box::new(state)),
+        Err(ended) => Told::Halted(ended),
+    }));
 }
 
 /// Says where what was there before is now.
@@ -483,10 +484,15 @@ fn look_for_boards(
     let Some(board) = session.target.as_ref().and_then(|target| target.board) else {
         return Ok(Vec::new());
     };
+    // What is there is told after work that was stopped, too.
+    let stopped = out.is_cancelled();
     let mut all = Vec::new();
     for (k, entry) in session.frames.iter().enumerate() {
-        // No tick: what is there is told after work that was stopped, too.
-        out.progress(k as f64 / session.frames.len() as f64, texts::LOOKING, None);
+        let (share, step) = (k as f64 / session.frames.len() as f64, texts::picture_of(k, session));
+        match stopped {
+            true => out.progress(share, &step, None),
+            false => out.tick(share, &step),
+        }
         let hash = entry.sha256.clone().unwrap_or_default();
         let seen = match memory.seen.get(&hash) {
             Some(seen) => seen.clone(),

@@ -4,6 +4,7 @@ mod sketch;
 mod work;
 
 use crate::desk::Desk;
+use crate::place::Place;
 use crate::texts::rig as texts;
 use crate::theme;
 use crate::widgets::{self, Sign};
@@ -16,7 +17,7 @@ use weavelight::instrument::{CalibratedLight, RigLightPlace};
 use weavelight_calibration::description::Light;
 
 /// What this room asks of the worker.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Ask {
     /// Look for board and camera.
     Find,
@@ -24,8 +25,8 @@ pub enum Ask {
     Light(Option<usize>),
     /// One light after the other.
     TestEach,
-    /// What the calibration says of the lights.
-    ReadCalibration,
+    /// What a rig's calibration says of the lights.
+    ReadCalibration(Box<Place>),
 }
 
 /// What the worker tells this room.
@@ -56,15 +57,20 @@ pub struct Rig {
 impl Rig {
     /// Draws the room.
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        if !self.asked {
+        if let Some(place) = desk.place.clone().filter(|_| !self.asked) {
             self.asked = true;
-            desk.ask(Command::Rig(Ask::ReadCalibration));
+            desk.ask(Command::Rig(Ask::ReadCalibration(Box::new(place))));
         }
         let pane = egui::Panel::left("rig parts").exact_size(320.0).resizable(false);
         pane.show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| self.parts(ui, desk));
         });
         egui::CentralPanel::default().show(ui, |ui| self.lights(ui, desk));
+    }
+
+    /// The lights may have been calibrated.
+    pub fn is_stale(&mut self) {
+        self.asked = false;
     }
 
     fn parts(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {

@@ -17,9 +17,8 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         Ask::Find => find(tools, out),
         Ask::Light(light) => show(light, tools, out),
         Ask::TestEach => test_each(tools, out),
-        Ask::ReadCalibration => {
-            let folder = tools.place.as_ref().map(|place| place.calibration());
-            let lights = folder.and_then(|folder| Calibration::load(&folder).ok());
+        Ask::ReadCalibration(place) => {
+            let lights = Calibration::load(&place.calibration()).ok();
             let lights = lights.map(|calibration| calibration.lights).unwrap_or_default();
             out.tell(Update::Rig(Told::Lights(lights)));
         }

@@ -50,7 +50,7 @@ impl Strip {
             ui.horizontal_centered(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.5 * theme::GAP;
                 let room = ui.available_width() / (lights + 1).max(1) as f32 - 0.5 * theme::GAP;
-                let width = room.clamp(40.0, 116.0);
+                let width = room.clamp(30.0, 116.0);
                 cells.for_each(|light| self.cell(ui, light, width));
             });
         });
@@ -90,7 +90,8 @@ impl Strip {
             font,
             visuals.text_color(),
         );
-        if let Some(sign) = sign {
+        // The frame's colour and weight say the same.
+        if let Some(sign) = sign.filter(|_| text.width() + 22.0 <= width) {
             sign.paint(painter, text.left_center() - vec2(9.0, 0.0), 5.0);
         }
         let name = texts::frame(&name, taking, frame.is_some());

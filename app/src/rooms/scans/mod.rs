@@ -7,6 +7,7 @@ pub use list::{Entry, incomplete};
 
 use crate::browse::Browse;
 use crate::desk::Desk;
+use crate::place::Place;
 use crate::rooms::{Room, look, scan};
 use crate::worker::{Command, Outbox, Tools};
 use crate::{texts::scans as texts, theme, widgets};
@@ -19,10 +20,10 @@ use std::path::PathBuf;
 /// What this room asks of the worker.
 #[derive(Debug)]
 pub enum Ask {
-    /// What there is.
-    List,
-    /// The picture of a scan.
-    Thumbnail(PathBuf),
+    /// What there is of a rig.
+    List(Box<Place>),
+    /// The picture of a scan of a rig.
+    Thumbnail(Box<Place>, PathBuf),
     /// A scan and its solution into the system's bin.
     Delete(Entry),
     /// Out of the bin again.
@@ -39,8 +40,8 @@ pub enum Ask {
 /// What the worker tells this room.
 #[derive(Debug)]
 pub enum Told {
-    /// What there is.
-    List(Vec<Entry>),
+    /// What there is of the rig in a folder.
+    List(PathBuf, Vec<Entry>),
     /// The picture of a scan.
     Thumbnail(PathBuf, ColorImage),
     /// A scan and its solution are in the bin.
@@ -59,7 +60,8 @@ const PICTURE: f32 = 128.0;
 /// What this room keeps.
 #[derive(Default)]
 pub struct Scans {
-    entries: Vec<Entry>,
+    /// `None` until they come.
+    entries: Option<Vec<Entry>>,
     search: String,
     chosen: Option<PathBuf>,
     pictures: HashMap<PathBuf, Picture>,
@@ -80,16 +82,17 @@ enum Picture {
 
 impl std::fmt::Debug for Scans {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Scans").field("entries", &self.entries.len()).finish_non_exhaustive()
+        let entries = self.entries.as_ref().map(Vec::len);
+        f.debug_struct("Scans").field("entries", &entries).finish_non_exhaustive()
     }
 }
 
 impl Scans {
     /// Draws the room.
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        if !self.fresh {
+        if let Some(place) = desk.place.clone().filter(|_| !self.fresh) {
             self.fresh = true;
-            desk.ask(Command::Scans(Ask::List));
+            desk.ask(Command::Scans(Ask::List(Box::new(place))));
         }
         let chosen = self.chosen.as_ref().and_then(|path| self.entry(path)).cloned();
         if let Some(entry) = chosen {
@@ -100,7 +103,7 @@ impl Scans {
     }
 
     fn entry(&self, path: &PathBuf) -> Option<&Entry> {
-        self.entries.iter().find(|entry| entry.folder == *path)
+        self.entries.iter().flatten().find(|entry| entry.folder == *path)
     }
 
     fn gallery(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
@@ -112,7 +115,11 @@ impl Scans {
             });
         });
         self.offer_undo(ui, desk);
-        if self.entries.is_empty() {
+        let Some(entries) = &self.entries else {
+            ui.label(RichText::new(texts::LISTING).weak());
+            return;
+        };
+        if entries.is_empty() {
             if widgets::empty(ui, texts::NONE, texts::GO_SCAN) {
                 desk.go_to(Room::Scan);
             }
@@ -150,7 +157,7 @@ impl Scans {
     fn found(&self) -> Vec<Entry> {
         let wanted = self.search.to_lowercase();
         let fits = |entry: &&Entry| entry.name.to_lowercase().contains(&wanted);
-        self.entries.iter().filter(fits).cloned().collect()
+        self.entries.iter().flatten().filter(fits).cloned().collect()
     }
 
     /// Arrows choose, Enter opens, Control and E exports, Delete deletes.
@@ -225,7 +232,10 @@ impl Scans {
         desk: &mut Desk,
     ) -> Option<TextureHandle> {
         let picture = self.pictures.entry(entry.folder.clone()).or_insert_with(|| {
-            desk.ask(Command::Scans(Ask::Thumbnail(entry.folder.clone())));
+            let place = desk.place.clone().map(Box::new);
+            if let Some(place) = place {
+                desk.ask(Command::Scans(Ask::Thumbnail(place, entry.folder.clone())));
+            }
             Picture::Asked
         });
         if let Picture::Here(image) = picture {
@@ -257,7 +267,6 @@ impl Scans {
             if ui.add_enabled(idle && entry.is_complete(), egui::Button::new(again)).clicked() {
                 let (scan, settings) = (entry.folder.clone(), desk.settings.solve);
                 desk.ask(Command::Scan(scan::Ask::Solve { scan, settings }));
-                desk.ask(Command::Scans(Ask::List));
             }
             let delete = egui::Button::new(texts::DELETE);
             if ui.add_enabled(idle, delete).on_hover_text(texts::DELETE_HINT).clicked() {
@@ -293,9 +302,13 @@ impl Scans {
     }
 
     /// Takes in what the worker tells.
-    pub fn hear(&mut self, told: Told, _desk: &mut Desk) {
+    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
         match told {
-            Told::List(entries) => self.entries = entries,
+            Told::List(of, entries) => {
+                if desk.place.as_ref().is_some_and(|place| place.folder == of) {
+                    self.entries = Some(entries);
+                }
+            }
             Told::Thumbnail(folder, picture) => {
                 self.pictures.insert(folder, Picture::Here(picture));
             }

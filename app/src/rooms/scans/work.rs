@@ -15,18 +15,25 @@ use weavelight::session::Session;
 use weavelight::solution::OUTPUT;
 
 pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
-    let Some(place) = &tools.place else { return };
     match ask {
-        Ask::List => out.tell(Update::Scans(Told::List(list(place)))),
-        Ask::Thumbnail(folder) => {
-            if let Some(picture) = thumbnail(place, &folder) {
+        Ask::List(place) => tell_list(&place, out),
+        Ask::Thumbnail(place, folder) => {
+            if let Some(picture) = thumbnail(&place, &folder) {
                 out.tell(Update::Scans(Told::Thumbnail(folder, picture)));
             }
         }
-        Ask::Delete(entry) => delete(entry, place, out),
-        Ask::BringBack(entry) => bring_back(entry, place, out),
+        Ask::Delete(entry) => delete(entry, out),
+        Ask::BringBack(entry) => bring_back(entry, out),
         Ask::Export { solution, to } => export(&solution, &to, out),
     }
+    // What was deleted or brought back changes the list.
+    if let Some(place) = &tools.place {
+        tell_list(place, out);
+    }
+}
+
+fn tell_list(place: &Place, out: &Outbox) {
+    out.tell(Update::Scans(Told::List(place.folder.clone(), list(place))));
 }
 
 /// The first light's frame made small; kept as a file beside the scans, for the next time.
@@ -63,12 +70,11 @@ fn keep(picture: &ColorImage, file: &Path) {
     let _ = image::RgbImage::from_raw(width, height, rgb).map(|image| image.save(file));
 }
 
-fn delete(entry: Entry, place: &Place, out: &Outbox) {
+fn delete(entry: Entry, out: &Outbox) {
     match trash::delete_all(folders(&entry)) {
         Ok(()) => out.tell(Update::Scans(Told::Deleted(entry))),
         Err(error) => out.fail(texts::DELETING, &in_words(&entry, &error)),
     }
-    out.tell(Update::Scans(Told::List(list(place))));
 }
 
 /// The scan, and its solution where there is one.
@@ -80,12 +86,11 @@ fn in_words(entry: &Entry, error: &trash::Error) -> String {
     format!("{}: {error}; look into the system's bin", entry.folder.display())
 }
 
-fn bring_back(entry: Entry, place: &Place, out: &Outbox) {
+fn bring_back(entry: Entry, out: &Outbox) {
     match restore(&entry) {
         Ok(()) => out.tell(Update::Scans(Told::BroughtBack(entry))),
         Err(error) => out.fail(texts::BRINGING_BACK, &in_words(&entry, &error)),
     }
-    out.tell(Update::Scans(Told::List(list(place))));
 }
 
 /// What lay under the entry's names and was deleted last.
