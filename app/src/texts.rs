@@ -161,14 +161,17 @@ pub mod rig {
     }
 
     /// A place, millimetres.
-    pub fn place([x, y, z]: [f64; 3]) -> String {
+    pub fn place(place_mm: [f64; 3]) -> String {
+        // Adding zero makes -0 to 0.
+        let [x, y, z] = place_mm.map(|mm| mm.round() + 0.0);
         format!("{x:.0}, {y:.0}, {z:.0}")
     }
 
     /// A calibrated place, if there is one.
     pub fn calibrated(place_mm: Option<[f64; 3]>, sigma_mm: Option<f64>) -> String {
-        match (place_mm, sigma_mm) {
-            (Some([x, y, z]), Some(sigma)) => format!("{x:.1}, {y:.1}, {z:.1} ± {sigma:.1}"),
+        let tenths = |mm: f64| (10.0 * mm).round() / 10.0 + 0.0;
+        match (place_mm.map(|place_mm| place_mm.map(tenths)), sigma_mm) {
+            (Some([x, y, z]), Some(sigma)) => format!("{x:.1}, {y:.1}, {z:.1} ± {sigma:.2}"),
             (Some([x, y, z]), None) => format!("{x:.1}, {y:.1}, {z:.1}"),
             (None, _) => "not yet".to_owned(),
         }

@@ -42,8 +42,7 @@ pub const LAST_PICTURE: &str = "What the camera saw";
 /// Before the first picture.
 pub const NOTHING_YET: &str = "The picture appears here, with what is found in it.";
 /// On a simulated rig.
-pub const SIMULATED: &str =
-    "On the simulated rig nobody has hands: the program lays the target there by itself.";
+pub const SIMULATED: &str = "This rig is simulated: the program lays the target there for you. Take each picture, or let it do the rest.";
 /// A build without OpenCV.
 pub const NO_CHESSBOARDS: &str = "This window was built without OpenCV and cannot see chessboards, which the camera is calibrated with. Install a Weavelight that was built with it, or build it so (the README says how), and open this rig again. Scans with a calibration that is there already work as before.";
 /// The board's shape.
@@ -64,6 +63,8 @@ pub const NO_CHART: &str = "the chart is not described: name its file above the 
 pub const REFLECTANCE: &str = "Reflectance";
 /// The raised sheet's height.
 pub const RAISED: &str = "Height over the table";
+/// Before the note on a picture that is not of the task in hand.
+pub const LAST: &str = "The last picture:";
 /// No calibration yet.
 pub const NEVER: &str = "Not calibrated yet.";
 /// The limit of age.
@@ -206,7 +207,7 @@ pub fn chart_taken(patches: usize, frames: usize) -> String {
 /// A sheet that serves.
 pub fn sheet_seen(seen: &SeenSheet) -> String {
     format!(
-        "{} cells are measured; tilted by {:.1}°, {:.0} mm over the table, the brightest at {:.0} % of full scale.",
+        "{} cells are measured; tilted by {:.1}°, {:.0} mm over the table, the brightest at {:.0} % of full scale (50 to 90 is good).",
         seen.cells_px.len(),
         seen.tilt_deg,
         seen.height_mm,
@@ -401,7 +402,10 @@ pub fn where_kept(name: &str) -> String {
 
 /// That it is there.
 pub fn kept(name: &str) -> String {
-    format!("What was there before is kept in the rig's folder, under {}.", where_kept(name))
+    format!(
+        "What was there before is kept in the rig's folder, under {}; History takes it back.",
+        where_kept(name)
+    )
 }
 
 /// An entry of the history: its stamp, `2026-11-22T1648`, as people write it.

@@ -136,7 +136,7 @@ impl Calibrate {
                     return;
                 }
                 let corners = self.state.as_ref().filter(|_| task == Task::Board);
-                self.view.ui(ui, corners.map_or(&[], |state| &state.corners_px));
+                self.view.ui(ui, task, corners.map_or(&[], |state| &state.corners_px));
             }
         });
     }
@@ -294,7 +294,8 @@ impl Calibrate {
                 }
             }
             Told::Picture(picture) => {
-                self.view.show(*picture);
+                let of = self.wanted();
+                self.view.show(*picture, of);
                 if std::mem::take(&mut self.live.awaited) {
                     self.look(desk);
                 }

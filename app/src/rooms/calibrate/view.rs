@@ -17,6 +17,8 @@ use weavelight::instrument::CameraKind;
 #[derive(Default)]
 pub(super) struct View {
     picture: Option<(Picture, Option<TextureHandle>)>,
+    /// What it was taken for.
+    of: Option<Task>,
 }
 
 impl std::fmt::Debug for View {
@@ -26,8 +28,9 @@ impl std::fmt::Debug for View {
 }
 
 impl View {
-    pub(super) fn show(&mut self, picture: Picture) {
+    pub(super) fn show(&mut self, picture: Picture, of: Option<Task>) {
         self.picture = Some((picture, None));
+        self.of = of;
     }
 
     /// Whether one was taken since the rig was opened.
@@ -36,11 +39,14 @@ impl View {
     }
 
     /// The picture as large as there is room, with what was found; `earlier`: corners of the pictures before it.
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui, earlier: &[[f64; 2]]) {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, task: Task, earlier: &[[f64; 2]]) {
         let Some((picture, texture)) = &mut self.picture else { return nothing_yet(ui) };
         ui.horizontal_wrapped(|ui| {
             let sign = if picture.good { Sign::Good } else { Sign::Warning };
             sign.ui(ui);
+            if self.of.is_some_and(|of| of != task) {
+                ui.label(RichText::new(texts::LAST).weak());
+            }
             ui.label(&picture.note);
         });
         let texture = texture.get_or_insert_with(|| {
