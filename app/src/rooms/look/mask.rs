@@ -126,7 +126,7 @@ impl Painting {
         true
     }
 
-    fn turn_over(&mut self, step: &Step) {
+    fn turn_over(&mut self, step: &[Range<usize>]) {
         for run in step {
             self.mask.data[run.clone()].iter_mut().for_each(|pixel| *pixel = !*pixel);
         }
