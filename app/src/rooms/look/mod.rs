@@ -286,7 +286,7 @@ impl Look {
     ) {
         ui.horizontal(|ui| {
             let label = ui.label(name);
-            let width = (ui.available_width() - 190.0).max(60.0);
+            let width = (ui.available_width() - 160.0).max(60.0);
             let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
             ui.add(field).labelled_by(label.id);
             if let Some(folder) = self.browse.folder(ui) {
