@@ -2,7 +2,7 @@
 //! own, so that no frame waits for the disk.
 
 use crate::settings::Settings;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -32,8 +32,10 @@ impl Keeper {
     pub fn look_at(&mut self, settings: &Settings) {
         if *settings != self.known {
             self.known = settings.clone();
-            // The thread lives as long as this value.
-            let _ = self.changes.as_ref().map(|changes| changes.send(settings.clone()));
+            if let Some(changes) = &self.changes {
+                // The thread lives as long as this value.
+                let _ = changes.send(settings.clone());
+            }
         }
     }
 
@@ -53,11 +55,8 @@ impl Drop for Keeper {
 
 fn keep(inbox: &Receiver<Settings>, troubles: &Sender<String>) {
     while let Ok(mut newest) = inbox.recv() {
-        loop {
-            match inbox.recv_timeout(QUIET) {
-                Ok(newer) => newest = newer,
-                Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
-            }
+        while let Ok(newer) = inbox.recv_timeout(QUIET) {
+            newest = newer;
         }
         if let Err(error) = newest.save() {
             // There may be nobody left to be told.

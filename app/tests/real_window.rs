@@ -116,10 +116,9 @@ impl Desktop {
     }
 
     /// Clicks something by its place.
-    fn click(&self, what: &str, x: u32, y: u32) {
+    fn click(&self, [x, y]: [u32; 2]) {
         // It may just be about to appear.
         std::thread::sleep(Duration::from_secs(1));
-        println!("clicking “{what}”");
         self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.2", "click", "1"]);
     }
 
@@ -267,11 +266,12 @@ fn the_first_run_takes_five_minutes() {
     let tell = |what: &str| println!("{:5.1} s: {what}", begun.elapsed().as_secs_f64());
     desktop.open();
     tell("the window is there");
-    // Where the buttons are in a window of 1280 x 800 points: see the room's pictures.
-    desktop.click("Try it with a simulated rig", 698, 287);
+    // Where the buttons are in a window of 1280 x 800 points: see the rooms' pictures.
+    let (try_it, calibrate, by_itself) = ([698, 287], [844, 259], [780, 128]);
+    desktop.click(try_it);
     exists(&rig.join("rig.toml"));
-    desktop.click("Calibrate it", 844, 259);
-    desktop.click("Do the rest by itself", 816, 128);
+    desktop.click(calibrate);
+    desktop.click(by_itself);
     exists(&rig.join("calibration/camera.toml"));
     tell("the camera is calibrated");
     exists(&rig.join("calibration/lights.toml"));
