@@ -4,6 +4,8 @@
 
 mod bare;
 mod bench;
+#[path = "../desk/names.rs"]
+mod names;
 mod pictures;
 mod shading;
 mod tiles;

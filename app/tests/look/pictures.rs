@@ -26,6 +26,7 @@ fn check(
             // Tiles come to the card when they are first drawn.
             window.render().unwrap();
             window.run();
+            super::names::check_names(&window);
             results.add(
                 window.try_snapshot(format!("look-{name}-{}x{}-{theme_name}", size[0], size[1])),
             );

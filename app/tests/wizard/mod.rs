@@ -12,7 +12,9 @@ use crate::desk::{self, Window};
 use eframe::egui;
 #[cfg(feature = "opencv")]
 use egui_kittest::SnapshotResults;
-use egui_kittest::kittest::{NodeT, Queryable};
+#[cfg(not(feature = "opencv"))]
+use egui_kittest::kittest::NodeT;
+use egui_kittest::kittest::Queryable;
 use weavelight::simulate;
 #[cfg(feature = "opencv")]
 use weavelight_app::desk::Severity;
@@ -63,20 +65,6 @@ fn looks(window: &mut Window, name: &str, results: &mut SnapshotResults) {
     (0..4).for_each(|_| window.harness.step());
 }
 
-/// Every control says what it is.
-#[cfg(feature = "opencv")]
-fn check_names(window: &Window) {
-    use egui::accesskit::Role;
-    for role in [Role::Button, Role::TextInput, Role::SpinButton, Role::CheckBox] {
-        for control in window.harness.query_all_by_role(role) {
-            let node = control.accesskit_node();
-            let named = node.label().is_some_and(|label| !label.trim().is_empty())
-                || node.labelled_by().next().is_some();
-            assert!(named, "a {role:?} without a name: {:?}", control.rect());
-        }
-    }
-}
-
 #[cfg(not(feature = "opencv"))]
 #[test]
 fn without_chessboards_the_wizard_says_what_to_build() {
@@ -95,7 +83,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     let mut results = SnapshotResults::new();
     window.until_label("Lay the chessboard flat in the middle");
     looks(&mut window, "calibrate-start", &mut results);
-    check_names(&window);
+    desk::check_names(&window.harness);
 
     // Live: the board is drawn over the picture as it is moved about, again and again, and nothing is kept.
     window.click("Live");
@@ -114,7 +102,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     window.idle();
     window.until_label("2 of 12 pictures");
     looks(&mut window, "calibrate-board", &mut results);
-    check_names(&window);
+    desk::check_names(&window.harness);
 
     // The rest by itself, stopped on the way: what is finished stays.
     window.click("Do the rest by itself");
@@ -139,7 +127,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     let failed = problems.iter().any(|problem| problem.severity == Severity::Error);
     assert!(!failed, "{problems:?}");
     looks(&mut window, "calibrate-done", &mut results);
-    check_names(&window);
+    desk::check_names(&window.harness);
     check_against_truth(&window);
 
     // Again, and back: the pictures are put away and lose nothing.
