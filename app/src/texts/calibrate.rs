@@ -376,9 +376,6 @@ pub fn picture_of(k: usize, session: &weavelight::session::Session) -> String {
     format!("picture {} of {}", k + 1, session.frames.len())
 }
 
-/// What comes after a calibration.
-pub const GO_SCAN: &str = "Scan a swatch";
-
 /// How old it is.
 pub fn age(days: i64) -> String {
     match days {
