@@ -1,7 +1,7 @@
 //! `calibrate camera`: intrinsics, distortion and the table's pose from pictures of a chessboard.
 
 use super::boards::{self, Corners, shape_of};
-use super::frames::{check_size, grey_picture, read_frame};
+use super::frames::{check_size, grey_picture};
 use super::{CalibrateError, Inputs, Progress};
 use crate::files::Provenance;
 use crate::instrument::{MeasuredCamera, Optics, Rig, write_camera};
@@ -195,7 +195,7 @@ fn find_all(
         .par_iter()
         .with_max_len(1)
         .map(|picture| {
-            let frame = read_frame(picture.session, picture.entry)?;
+            let frame = picture.session.frame(picture.entry)?;
             check_size(&picture.path(), &frame, rig, size)?;
             let view = boards::detect(&grey_picture(&frame), shape)?;
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
@@ -239,7 +239,7 @@ fn none_found(pictures: &[Picture], shape: &BoardShape) -> CalibrateError {
 }
 
 fn other_size(picture: &Picture, shape: &BoardShape) -> Option<[usize; 2]> {
-    let grey = grey_picture(&read_frame(picture.session, picture.entry).ok()?);
+    let grey = grey_picture(&picture.session.frame(picture.entry).ok()?);
     let near = |n: usize| [n.wrapping_sub(1), n, n + 1];
     let sizes = near(shape.columns).into_iter().flat_map(|c| near(shape.rows).map(|r| [c, r]));
     let possible = sizes.filter(|size| size.iter().all(|n| (3..100).contains(n)));

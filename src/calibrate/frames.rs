@@ -2,21 +2,10 @@
 
 use super::CalibrateError;
 use crate::instrument::{Color, Defects};
-use crate::raw::{Encoding, Frame, Hint, Layout, ReadError, Samples, decode};
-use crate::session::{self, FrameEntry, Session};
+use crate::raw::{Frame, Layout, Samples};
+use crate::session::FrameEntry;
 use std::path::Path;
 use weavelight_calibration::description::Image;
-
-/// Reads one frame, its hash checked.
-pub(super) fn read_frame(session: &Session, entry: &FrameEntry) -> Result<Frame, CalibrateError> {
-    let bytes = session.read_frame(entry)?;
-    let encoding = entry.encoding.map(|encoding| match encoding {
-        session::Encoding::Linear => Encoding::Linear,
-        session::Encoding::Srgb => Encoding::Srgb,
-    });
-    decode(&bytes, &Hint { cfa: entry.cfa, encoding })
-        .map_err(|source| ReadError::Decode { path: session.frame_path(entry), source }.into())
-}
 
 /// Exposure time times ISO / 100.
 pub(super) fn seconds_at_iso_100(entry: &FrameEntry) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::CalibrateError;
 use super::defective;
-use super::frames::{Levels, raw_at, read_frame, seconds_at_iso_100};
+use super::frames::{Levels, raw_at, seconds_at_iso_100};
 use crate::instrument::Defects;
 use crate::raw::{Frame, Layout, Metadata};
 use crate::session::{FrameEntry, Patch, Session};
@@ -67,7 +67,7 @@ pub(super) fn read_chart(
     patches: &[Patch],
 ) -> Result<ChartFrames, CalibrateError> {
     let read = |entry: &FrameEntry| -> Result<(Frame, Cfa), CalibrateError> {
-        let frame = read_frame(session, entry)?;
+        let frame = session.frame(entry)?;
         let Layout::Mosaic(cfa) = frame.layout else {
             let remedy = "take the chart as RAW, or skip this step: without color.toml the frames' own levels are used";
             return Err(CalibrateError::target(

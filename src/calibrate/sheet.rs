@@ -1,9 +1,7 @@
 //! What one white sheet showed: cells over the frame, every light's mean signal in each.
 
 use super::boards::{self, shape_of};
-use super::frames::{
-    Levels, Mean, Rect, check_size, grey_picture, mean_in, read_frame, seconds_at_iso_100,
-};
+use super::frames::{Levels, Mean, Rect, check_size, grey_picture, mean_in, seconds_at_iso_100};
 use super::moved::Pattern;
 use super::{CalibrateError, Progress};
 use crate::instrument::{CAMERA_FILE, Color, Defects, Optics};
@@ -173,7 +171,7 @@ fn average(
     known: Known,
     rects: &[Rect],
 ) -> Result<Averaged, CalibrateError> {
-    let frame = read_frame(session, entry)?;
+    let frame = session.frame(entry)?;
     let size = [known.camera.width_px, known.camera.height_px];
     check_size(&session.frame_path(entry), &frame, std::path::Path::new(CAMERA_FILE), size)?;
     let levels = Levels::of(&frame, known.color);

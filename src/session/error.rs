@@ -1,4 +1,5 @@
 use crate::files::FileError;
+use crate::raw::ReadError;
 use std::path::PathBuf;
 
 /// What goes wrong with a capture session. Each message says what, where, and what to do.
@@ -7,6 +8,9 @@ pub enum SessionError {
     /// `session.toml` or the folder.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A frame's file that is no usable picture.
+    #[error(transparent)]
+    Frame(#[from] ReadError),
     /// A frame that the manifest names is not there.
     #[error("{}: this frame is missing; put it back under the name in session.toml, or remove its [[frames]] entry", .path.display())]
     FrameMissing {

@@ -1,7 +1,19 @@
-use super::{FrameEntry, MANIFEST, Session, SessionError};
+use super::{Encoding, FrameEntry, MANIFEST, Session, SessionError};
 use crate::files::{FileError, sha256_hex};
+use crate::raw::{self, Frame, Hint, ReadError, decode};
 use std::io;
 use std::path::PathBuf;
+
+impl FrameEntry {
+    /// What the manifest says of the frame that its file may not say: encoding and mosaic.
+    pub fn hint(&self) -> Hint {
+        let encoding = self.encoding.map(|encoding| match encoding {
+            Encoding::Linear => raw::Encoding::Linear,
+            Encoding::Srgb => raw::Encoding::Srgb,
+        });
+        Hint { cfa: self.cfa, encoding }
+    }
+}
 
 impl Session {
     /// The manifest's path.
@@ -17,6 +29,17 @@ impl Session {
     /// Where the mask is, if there is one.
     pub fn mask_path(&self) -> Option<PathBuf> {
         self.mask.as_ref().map(|mask| self.folder.join(mask))
+    }
+
+    /// A frame as it was taken: its file, checked against the recorded hash, decoded as the manifest says. The one way to a
+    /// decoded frame of a capture session.
+    ///
+    /// # Errors
+    /// Where the file is missing, unreadable, altered or no picture; with path and remedy.
+    pub fn frame(&self, entry: &FrameEntry) -> Result<Frame, SessionError> {
+        let bytes = self.read_frame(entry)?;
+        decode(&bytes, &entry.hint())
+            .map_err(|source| ReadError::Decode { path: self.frame_path(entry), source }.into())
     }
 
     /// The bytes of a frame's file, checked against the recorded hash: what is decoded is what was hashed.

@@ -1,7 +1,9 @@
 use super::*;
+use crate::raw::{Frame, Layout, Samples};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::fs;
 use std::path::Path;
+use weavelight_calibration::description::Image;
 
 const FRAME: &str = "[[frames]]\nfile = \"a.png\"\nlight = 0\nexposure_s = 0.5\niso = 100\n";
 
@@ -225,6 +227,41 @@ fn frames_are_checked_against_their_hash() {
     let error = session.read_frame(&session.frames[0]).unwrap_err().to_string();
     assert!(error.contains("a.png: this frame is missing"), "{error}");
     assert!(session.check_files().is_err());
+}
+
+/// An 8-bit picture does not say how it encodes light, nor a grey one its mosaic: the manifest does, for everybody who decodes.
+#[test]
+fn frames_are_decoded_as_the_manifest_says() {
+    let grey = Image { width: 2, height: 2, data: vec![0_u8, 128, 128, 255] };
+    let bytes = crate::raster::encode_png_grey8(&grey).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut writer = SessionWriter::create(Session::new(folder.path(), Kind::Swatch, "x")).unwrap();
+    let entry = |name: &str| FrameEntry::new(name, Some(0), 0.5, 100.0);
+    let bggr = Cfa::parse("BGGR");
+    let says = [
+        FrameEntry { encoding: Some(Encoding::Srgb), ..entry("srgb.png") },
+        FrameEntry { encoding: Some(Encoding::Linear), cfa: bggr, ..entry("mosaic.png") },
+        entry("silent.png"),
+    ];
+    for entry in says {
+        writer.add(entry, &bytes).unwrap();
+    }
+    let session = Session::load(folder.path()).unwrap();
+    let share = |frame: &Frame| match &frame.samples {
+        Samples::U16(samples) => f64::from(samples[1]) / f64::from(samples[3]),
+        Samples::F32(samples) => f64::from(samples[1] / samples[3]),
+    };
+    let [srgb, mosaic, silent] = [0, 1, 2].map(|k| session.frame(&session.frames[k]));
+    let (srgb, mosaic) = (srgb.unwrap(), mosaic.unwrap());
+    // sRGB's 128 is 21.6 % of white.
+    assert!((share(&srgb) - 0.2159).abs() < 1e-3, "{srgb:?}");
+    assert!((share(&mosaic) - 128.0 / 255.0).abs() < 1e-3, "{mosaic:?}");
+    assert_eq!((srgb.layout, mosaic.layout), (Layout::Grey, Layout::Mosaic(bggr.unwrap())));
+    let error = silent.unwrap_err().to_string();
+    assert!(error.contains("silent.png: an 8-bit picture does not say"), "{error}");
+    fs::write(folder.path().join("srgb.png"), "other").unwrap();
+    let error = session.frame(&session.frames[0]).unwrap_err().to_string();
+    assert!(error.contains("srgb.png: this frame was altered"), "{error}");
 }
 
 #[test]

@@ -8,8 +8,8 @@ use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
 use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
 use crate::raster::{Values, decode_picture};
-use crate::raw::{Encoding, Frame, Hint, ReadError, decode};
-use crate::session::{self, FrameEntry, Kind, Session};
+use crate::raw::{Frame, ReadError};
+use crate::session::{FrameEntry, Kind, Session, SessionError};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -176,7 +176,7 @@ fn read_frames(
     let finished = AtomicUsize::new(0);
     let total = session.frames.len();
     let read = |entry: &FrameEntry| {
-        let frame = read_frame(session, entry);
+        let frame = session.frame(entry);
         let done = finished.fetch_add(1, Ordering::Relaxed) + 1;
         progress(Progress { stage: Stage::Read, done, total });
         frame
@@ -184,23 +184,13 @@ fn read_frames(
     let at_once = FILES_AT_ONCE.min(rayon::current_num_threads().max(1));
     let mut frames = Vec::with_capacity(total);
     for group in session.frames.chunks(at_once) {
-        let decoded: Vec<Result<Frame, SolveError>> =
+        let decoded: Vec<Result<Frame, SessionError>> =
             group.par_iter().with_max_len(1).map(read).collect();
         for frame in decoded {
             frames.push(frame?);
         }
     }
     Ok(frames)
-}
-
-fn read_frame(session: &Session, entry: &FrameEntry) -> Result<Frame, SolveError> {
-    let bytes = session.read_frame(entry)?;
-    let encoding = entry.encoding.map(|encoding| match encoding {
-        session::Encoding::Linear => Encoding::Linear,
-        session::Encoding::Srgb => Encoding::Srgb,
-    });
-    decode(&bytes, &Hint { cfa: entry.cfa, encoding })
-        .map_err(|source| ReadError::Decode { path: session.frame_path(entry), source }.into())
 }
 
 fn exposure(session: &Session, entry: &FrameEntry, frame: Frame) -> Exposure {

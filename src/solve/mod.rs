@@ -63,7 +63,7 @@ pub use progressive::{Level, progressively};
 pub use reduce::reduced_camera;
 pub use residual::ResidualRows;
 pub use rows::Rows;
-pub use run::{Page, Shown, Solved, method_name, run, run_with_page};
+pub use run::{Page, Shown, Solved, method_name, method_of, run, run_with_page};
 pub use scene::{Exposure, Origin, PhotographedLight, Scene};
 pub use settings::{DeviceName, MethodName, NormalYName, Settings};
 pub use swatch::{Swatch, find_swatch};

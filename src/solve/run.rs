@@ -317,6 +317,16 @@ pub fn method_name(method: Method) -> &'static str {
     }
 }
 
+/// How a solution was solved; `None` where its report names a method that this version does not know. Reports without the
+/// key are of versions that knew one way only.
+pub fn method_of(report: &Report) -> Option<Method> {
+    let all = [Method::Auto, Method::LeastSquares, Method::Weighted, Method::Robust];
+    match report.method.as_str() {
+        "" => Some(Method::Auto),
+        name => all.into_iter().find(|method| method_name(*method) == name),
+    }
+}
+
 fn outcomes(counts: &Counts) -> BTreeMap<String, u64> {
     let names = [
         (Outcome::Fitted, "fitted"),

@@ -183,6 +183,12 @@ pub fn reduced(scale: usize) -> String {
     format!("This is a preview at 1/{scale} of the frames' size. Solve at full size to see them.")
 }
 
+pub fn unknown_method(method: &str) -> String {
+    format!(
+        "These maps were solved by the method \"{method}\", which this version does not know. Solve the scan again to see its frames."
+    )
+}
+
 pub fn against(name: &str) -> String {
     format!("Against {name}")
 }

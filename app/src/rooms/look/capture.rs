@@ -6,9 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use weavelight::files::{Input, sha256_of_file};
 use weavelight::instrument::LIGHTS_FILE;
+use weavelight::photometry::Method;
 use weavelight::raster::read_mask;
 use weavelight::session::{MANIFEST, Session};
 use weavelight::solution::Report;
+use weavelight::solve::method_of;
 use weavelight_calibration::description::Image;
 
 /// Where a solution comes from.
@@ -31,6 +33,15 @@ pub struct Sources {
     pub session: PathBuf,
     /// The calibration's folder.
     pub calibration: PathBuf,
+    /// How the solution was solved: what is solved again is to be the same.
+    pub method: Method,
+}
+
+impl Sources {
+    /// Whether both are of the same frames, however they were solved.
+    pub(super) fn same_frames(&self, other: &Self) -> bool {
+        (&self.session, &self.calibration) == (&other.session, &other.calibration)
+    }
 }
 
 /// A folder that may be the one, and whether it is.
@@ -56,6 +67,7 @@ pub(super) fn capture_of(
     if report.scale != 1 {
         return Err(texts::reduced(report.scale));
     }
+    let method = method_of(report).ok_or_else(|| texts::unknown_method(&report.method))?;
     let session = find_session(folder, place, report)?;
     let calibration =
         find_calibration(folder, place, report).ok_or_else(|| texts::NO_CALIBRATION.to_owned())?;
@@ -66,7 +78,7 @@ pub(super) fn capture_of(
     Ok(Capture {
         mask: read.mask_path().and_then(|path| read_mask(&path).ok()).map(Arc::new),
         changed: !(session.fits && calibration.fits),
-        sources: Sources { session: session.folder, calibration: calibration.folder },
+        sources: Sources { session: session.folder, calibration: calibration.folder, method },
         lights,
     })
 }

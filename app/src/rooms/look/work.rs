@@ -9,7 +9,6 @@ use crate::worker::{Outbox, Tools, Update};
 use std::path::Path;
 use std::sync::Arc;
 use weavelight::files::FileError;
-use weavelight::photometry::Method;
 use weavelight::raster::write_png_grey8;
 use weavelight::report::page_of_solve;
 use weavelight::session::Session;
@@ -81,7 +80,7 @@ fn look_at(sources: &Sources, light: usize, kind: Kind, tools: &mut Tools, out: 
         out.tick(0.5, &title);
         let position = scene.lights.iter().position(|of| of.index == light);
         let Some(position) = position else { return Ok(None) };
-        let made = Rows::with_method(scene, Method::Auto, |rows| match kind {
+        let made = Rows::with_method(scene, sources.method, |rows| match kind {
             Kind::Picture => of_rgb(&rows.picture_of(position)),
             Kind::Residual => of_residual(&rows.residual_of(position)),
         })?;
@@ -106,10 +105,10 @@ fn of_residual(image: &Image<f32>) -> Arc<Pyramid> {
 fn photosite(sources: &Sources, at: [usize; 2], tools: &mut Tools, out: &Outbox) {
     let solve = |tools: &mut Tools| {
         let scene = scene(sources, tools, out)?;
-        Rows::with_method(scene, Method::Auto, |rows| rows.photosite(at))
+        Rows::with_method(scene, sources.method, |rows| rows.photosite(at))
     };
     // Once the frames are there, a click is answered at once.
-    let known = tools.frames.scene.is_some() && tools.frames.sources == *sources;
+    let known = tools.frames.scene.is_some() && tools.frames.sources.same_frames(sources);
     let found = match known {
         true => solve(tools).ok(),
         false => out.job(texts::READING_FRAMES, || solve(tools)).ok(),
@@ -124,7 +123,7 @@ fn scene<'t>(
     out: &Outbox,
 ) -> Result<&'t Scene, SolveError> {
     let frames = &mut tools.frames;
-    if frames.sources != *sources {
+    if !frames.sources.same_frames(sources) {
         *frames = Frames { sources: sources.clone(), scene: None };
     }
     let scene = match frames.scene.take() {
@@ -164,7 +163,7 @@ fn save_mask(session: &Path, mask: &Image<bool>, tools: &mut Tools, out: &Outbox
 
 /// The same call with the same settings as the command line's, and then its solution is looked at.
 fn solve(
-    Sources { session, calibration }: &Sources,
+    Sources { session, calibration, .. }: &Sources,
     solution: &Path,
     settings: SolveSettings,
     tools: &mut Tools,
