@@ -7,21 +7,23 @@ use std::path::PathBuf;
 
 /// Say how far two maps are apart
 ///
-/// Normals: angles in degrees. Colours: CIEDE2000 and the difference of linear values. Pixels that are 0 (unsolved) or
-/// not finite in either map do not count. Without --kind a map is taken for normals if its name says normal, or if it
-/// holds negative values or unit vectors only; else for colours.
+/// Maps are OpenEXR, or PNG, TIFF and JPEG: there normals are decoded as 2 v - 1, and colours by the file's own encoding
+/// (sRGB where it says nothing). Normals: angles in degrees. Colours: CIEDE2000 and the difference of linear values. Pixels
+/// that are 0 (unsolved) or not finite in either map do not count; a normal.png has no such pixels, so give it a --mask.
+/// Without --kind a map is taken for normals if its name says normal, or if it holds negative values or unit vectors only;
+/// else for colours.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  weavelight compare maps/normal.exr truth/normal.exr --mask maps/mask.png --json"
 )]
 pub(super) struct Args {
     /// One map
-    #[arg(value_name = "A.exr")]
+    #[arg(value_name = "A")]
     a: PathBuf,
     /// The other
-    #[arg(value_name = "B.exr")]
+    #[arg(value_name = "B")]
     b: PathBuf,
-    /// Picture that is not black where to compare
+    /// Picture that is white, or opaque, where to compare
     #[arg(long, value_name = "M.png")]
     mask: Option<PathBuf>,
     /// What the maps hold

@@ -28,10 +28,11 @@ pub(super) struct Args {
     /// Folder to write; must not hold anything yet
     #[arg(long, value_name = "SESSION")]
     out: PathBuf,
-    /// How the pictures encode light; 8-bit pictures must say, others are linear unless said
+    /// How the pictures encode light, where their files do not say (sRGB and gAMA chunks, ICC profiles): 8-bit pictures
+    /// must, others are linear unless said
     #[arg(long)]
     encoding: Option<EncodingName>,
-    /// Picture that is not black where the object is
+    /// Picture that is white, or opaque, where the object is
     #[arg(long, value_name = "M.png")]
     mask: Option<PathBuf>,
 }
@@ -64,7 +65,9 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let progress = Progress::new();
     let summary = import::run(&options, &|share, what| progress.set(share, what)).map_err(
         |error| match error {
-            ImportError::EncodingUnknown(_) => Failure::call(error),
+            ImportError::EncodingUnknown(_) | ImportError::EncodingUnreadable { .. } => {
+                Failure::call(error)
+            }
             _ => Failure::work(error),
         },
     )?;

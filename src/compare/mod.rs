@@ -2,13 +2,17 @@
 
 mod color;
 mod normal;
+mod read;
 mod statistics;
+#[cfg(test)]
+mod tests;
 
 pub use color::{ColorFigures, compare_colors};
 pub use normal::{NormalFigures, angle_deg, compare_normals};
 pub use statistics::percentile;
 
-use crate::raster::{Exr, Values, decode_picture, read_exr};
+use self::read::{Source, Suggestion};
+use crate::raster::read_mask;
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::Image;
 
@@ -33,11 +37,11 @@ pub enum Figures {
 /// What to compare.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// One map, EXR with channels R, G, B (or Y).
+    /// One map: OpenEXR, PNG, TIFF or JPEG.
     pub a: PathBuf,
     /// The other, of the same size.
     pub b: PathBuf,
-    /// A picture that is not 0 where to compare.
+    /// What is inside it is compared; see [`crate::raster::decode_mask`].
     pub mask: Option<PathBuf>,
     /// What the maps hold; guessed where absent, see [`guess_kind`].
     pub kind: Option<Kind>,
@@ -58,12 +62,6 @@ pub enum CompareError {
     /// A map cannot be read.
     #[error(transparent)]
     Picture(#[from] crate::raster::FileError),
-    /// A file cannot be read.
-    #[error(transparent)]
-    File(#[from] crate::files::FileError),
-    /// A map without colour channels.
-    #[error("{}: has no channels R, G, B and no Y; give a map as EXR", .0.display())]
-    Channels(PathBuf),
     /// Maps or mask of different size.
     #[error("{}: is {} x {}, but {} is {} x {}; give pictures of one size", .b.display(), .b_size[0], .b_size[1], .a.display(), .a_size[0], .a_size[1])]
     Size {
@@ -92,13 +90,14 @@ pub enum CompareError {
 /// # Errors
 /// Where a file cannot be read, sizes differ, or no pixel counts.
 pub fn run(options: &Options) -> Result<Comparison, CompareError> {
-    let (a, b) = (read_map(&options.a)?, read_map(&options.b)?);
-    check_size(&options.a, [a.width, a.height], &options.b, [b.width, b.height])?;
+    let (a, b) = (Source::open(&options.a)?, Source::open(&options.b)?);
+    check_size(&options.a, a.size(), &options.b, b.size())?;
     let mask = options.mask.as_ref().map(|path| read_mask(path)).transpose()?;
     if let (Some(path), Some(mask)) = (&options.mask, &mask) {
-        check_size(&options.a, [a.width, a.height], path, [mask.width, mask.height])?;
+        check_size(&options.a, a.size(), path, [mask.width, mask.height])?;
     }
-    let kind = options.kind.unwrap_or_else(|| guess_kind(&options.a, &a.data, &b.data));
+    let kind = options.kind.unwrap_or_else(|| guess_kind(&a, &b));
+    let (a, b) = (a.map(kind)?, b.map(kind)?);
     let (pairs, left_out) =
         counted_pairs(&a.data, &b.data, mask.as_ref().map(|mask| &mask.data[..]));
     let figures = match kind {
@@ -109,23 +108,24 @@ pub fn run(options: &Options) -> Result<Comparison, CompareError> {
     Ok(Comparison { figures: figures.ok_or_else(nothing)?, left_out })
 }
 
-/// What maps hold that nobody named: normals if the file's name says so, or a value is negative, or every value is a unit
-/// vector; else colours.
-pub fn guess_kind(path: &Path, a: &[[f32; 3]], b: &[[f32; 3]]) -> Kind {
+/// What maps hold that nobody named: what the first file's name says, or the second's, else what their numbers say.
+fn guess_kind(a: &Source, b: &Source) -> Kind {
+    let named = kind_of_name(a.path()).or_else(|| kind_of_name(b.path()));
+    named.unwrap_or_else(|| match [a.suggests(), b.suggests()] {
+        [Suggestion::Sure(kind), _] | [_, Suggestion::Sure(kind)] => kind,
+        [Suggestion::Likely(a), Suggestion::Likely(b)] if a == b => a,
+        _ => Kind::Normal,
+    })
+}
+
+/// Normals or colours, where a file's name says so.
+fn kind_of_name(path: &Path) -> Option<Kind> {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
     if name.contains("normal") {
-        return Kind::Normal;
+        return Some(Kind::Normal);
     }
-    if ["albedo", "color", "colour"].iter().any(|word| name.contains(word)) {
-        return Kind::Color;
-    }
-    let negative = a.iter().chain(b).flatten().any(|value| *value < 0.0);
-    let unit = |pixel: &[f32; 3]| {
-        (pixel.iter().map(|value| value * value).sum::<f32>() - 1.0).abs() < 0.01
-    };
-    let mut values = a.iter().chain(b).filter(|pixel| has_value(pixel)).peekable();
-    let some = values.peek().is_some();
-    if negative || (some && values.all(unit)) { Kind::Normal } else { Kind::Color }
+    let color = ["albedo", "color", "colour"].iter().any(|word| name.contains(word));
+    color.then_some(Kind::Color)
 }
 
 /// A pixel of both maps.
@@ -133,6 +133,10 @@ pub type Pair = ([f64; 3], [f64; 3]);
 
 fn has_value(pixel: &[f32; 3]) -> bool {
     pixel.iter().all(|value| value.is_finite()) && pixel.iter().any(|value| *value != 0.0)
+}
+
+fn is_unit(pixel: &[f32; 3]) -> bool {
+    (pixel.iter().map(|value| value * value).sum::<f32>() - 1.0).abs() < 0.01
 }
 
 /// The pixels inside the mask with a value in both maps, and how many inside lack one.
@@ -162,75 +166,12 @@ fn check_size(
     Err(CompareError::Size { a: a.to_owned(), a_size, b: b.to_owned(), b_size })
 }
 
-/// Reads a map: EXR with channels R, G, B, or Y as grey.
+/// Reads a map that says by its name or its numbers what it holds.
 ///
 /// # Errors
-/// Where the file cannot be read or has other channels.
+/// Where the file cannot be read or is no map.
 pub fn read_map(path: &Path) -> Result<Image<[f32; 3]>, CompareError> {
-    let exr = read_exr(path)?;
-    let [r, g, b] = channels(&exr).ok_or_else(|| CompareError::Channels(path.to_owned()))?;
-    let data = r.iter().zip(g).zip(b).map(|((r, g), b)| [*r, *g, *b]).collect();
-    Ok(Image { width: exr.width, height: exr.height, data })
-}
-
-fn channels(exr: &Exr) -> Option<[&[f32]; 3]> {
-    match (exr.channel("R"), exr.channel("G"), exr.channel("B"), exr.channel("Y")) {
-        (Some(r), Some(g), Some(b), _) => Some([r, g, b]),
-        (None, None, None, Some(y)) => Some([y, y, y]),
-        _ => None,
-    }
-}
-
-fn read_mask(path: &Path) -> Result<Image<bool>, CompareError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| crate::files::FileError::read(path, source))?;
-    let picture = decode_picture(&bytes)
-        .map_err(|source| crate::raster::FileError::Content { path: path.to_owned(), source })?;
-    let data = match &picture.values {
-        Values::U8(values) => not_black(values, picture.channels),
-        Values::U16(values) => not_black(values, picture.channels),
-        Values::F32(values) => not_black(values, picture.channels),
-    };
-    Ok(Image { width: picture.width, height: picture.height, data })
-}
-
-fn not_black<T: PartialOrd + Default>(values: &[T], channels: usize) -> Vec<bool> {
-    values
-        .chunks_exact(channels)
-        .map(|pixel| pixel.iter().any(|value| *value > T::default()))
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_kind_is_guessed_from_name_then_values() {
-        let check = |name: &str, pixels: &[[f32; 3]], expected: Kind| {
-            assert_eq!(guess_kind(Path::new(name), pixels, pixels), expected, "{name} {pixels:?}");
-        };
-        check("out/normal.exr", &[[0.5, 0.5, 0.5]], Kind::Normal);
-        check("albedo.exr", &[[0.0, 0.0, 1.0]], Kind::Color);
-        check("a.exr", &[[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0; 3]], Kind::Normal);
-        check("a.exr", &[[0.5, -0.5, 0.5]], Kind::Normal);
-        check("a.exr", &[[0.5, 0.5, 0.5], [0.0, 0.0, 1.0]], Kind::Color);
-        check("a.exr", &[[0.0; 3]], Kind::Color);
-    }
-
-    #[test]
-    fn only_pixels_with_a_value_in_both_count() {
-        let a = [[1.0, 0.0, 0.0], [0.0; 3], [f32::NAN, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
-        let b = [
-            [1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0],
-            [0.0, 0.0, 1.0],
-            [0.0, f32::INFINITY, 0.0],
-            [0.0, 1.0, 0.0],
-        ];
-        let (pairs, left_out) = counted_pairs(&a, &b, None);
-        assert_eq!((pairs.len(), left_out), (2, 3));
-        let (pairs, left_out) = counted_pairs(&a, &b, Some(&[false, true, true, false, true]));
-        assert_eq!((pairs.len(), left_out), (1, 2));
-    }
+    let source = Source::open(path)?;
+    let kind = guess_kind(&source, &source);
+    source.map(kind)
 }

@@ -65,6 +65,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Color, Provenance)>, FileErr
     let color = Color {
         black_level: file.black_level,
         saturation_level: file.saturation_level,
+        clip_level: None,
         response: file.response,
         // nalgebra stores columns; the file has rows.
         camera_to_linear_srgb: file

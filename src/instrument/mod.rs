@@ -143,6 +143,9 @@ pub struct Color {
     pub black_level: Option<[f64; 4]>,
     /// Raw number, black included.
     pub saturation_level: Option<f64>,
+    /// Raw number from which samples are clipped, where that is below the end of the range: found in the frames, and in no
+    /// file.
+    pub clip_level: Option<f64>,
     /// linear = sum c_i x^i with x = (raw - black) / (saturation - black); `[0, 1]` is linear.
     pub response: Vec<f64>,
     /// Applies to white-balanced RGB; rows sum to 1.
@@ -184,6 +187,7 @@ impl Default for Color {
         Self {
             black_level: None,
             saturation_level: None,
+            clip_level: None,
             response: vec![0.0, 1.0],
             camera_to_linear_srgb: None,
             white_balance: Vec::new(),

@@ -221,6 +221,7 @@ fn a_calibration_grows_file_by_file_and_is_read_as_written() {
     let color = Color {
         black_level: Some([600.0, 601.0, 602.0, 600.5]),
         saturation_level: Some(15892.0),
+        clip_level: None,
         response: vec![0.0, 0.99, 0.01],
         camera_to_linear_srgb: Some(Matrix3::new(1.5, -0.3, -0.2, -0.1, 1.3, -0.2, 0.0, -0.4, 1.4)),
         white_balance: vec![[2.0, 1.0, 1.5], [1.9, 1.0, 1.6]],

@@ -43,6 +43,12 @@ pub enum PictureError {
         /// What to do, as in "convert it to DNG".
         remedy: &'static str,
     },
+    /// A mask that leaves nothing to measure.
+    #[error("the mask is {all} everywhere; paint what is inside white, or leave the mask away")]
+    EmptyMask {
+        /// Black or transparent.
+        all: &'static str,
+    },
     /// Dimensions that no file of this length can fill.
     #[error(
         "the file claims {width} x {height} pixels, more than its {bytes} bytes can hold; copy it again from where it came"
@@ -62,8 +68,12 @@ impl PictureError {
         // Libraries' messages may run over several lines, and list every value of a damaged tag.
         let what: String = what.into();
         let line = what.lines().next().unwrap_or_default().trim_end_matches('.');
-        let short: String = line.chars().take(LONGEST_REASON).collect();
+        let mut short: String = line.chars().take(LONGEST_REASON).collect();
         let rest = if line.len() > short.len() { "..." } else { "" };
+        // A quotation that was cut would stay open.
+        if short.matches('"').count() % 2 == 1 {
+            short.retain(|c| c != '"');
+        }
         Self::Damaged { what: short + rest }
     }
 

@@ -9,6 +9,26 @@ const MOST_SAMPLES: u64 = 400_000_000;
 /// bits), LZW about 1400; a flat JPEG block of 64 samples takes six bits or more.
 const MOST_SAMPLES_PER_BYTE: u64 = 1_500;
 
+/// Bytes that one byte of a deflated file can stand for.
+const MOST_BYTES_PER_BYTE: u64 = 1_040;
+
+/// [`check`] for deflated rows of `row_bytes` bytes, which may hold several pixels in a byte.
+///
+/// # Errors
+/// As [`check`].
+pub(crate) fn check_packed(
+    [width, height]: [u64; 2],
+    row_bytes: u64,
+    bytes: usize,
+) -> Result<(), PictureError> {
+    let bytes = bytes as u64;
+    let packed = row_bytes.saturating_mul(height) / MOST_BYTES_PER_BYTE;
+    if width.saturating_mul(height) > MOST_SAMPLES || packed > bytes {
+        return Err(PictureError::TooLarge { width, height, bytes });
+    }
+    check(width, height, 1, usize::MAX)
+}
+
 /// # Errors
 /// No pixels at all, or more than the file's length can hold.
 pub(crate) fn check(

@@ -1,12 +1,12 @@
 //! Any picture file that other programs write, values as the file has them.
 
+use super::encoding::Said;
+use super::foreign::kind_not_read;
 use super::guard::guarded;
-use super::{FileError, PictureError, exr_in, limits};
-use std::io::Cursor;
+use super::{FileError, PictureError, exr_in, jpeg_in, png_in, tiff_in};
 use std::path::Path;
-use weavelight_calibration::description::Image;
 
-/// A decoded picture: rows from the top left, channels interleaved, alpha left out.
+/// A decoded picture: rows from the top left, channels interleaved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Pixels in a row.
@@ -17,17 +17,87 @@ pub struct Picture {
     pub channels: usize,
     /// `width * height * channels` values as the file has them.
     pub values: Values,
+    /// The number that stands for full scale; infinite for floating point, which has no ceiling.
+    pub full_scale: f32,
+    /// Opacity of each pixel, 0 to 1, where the file has an alpha channel.
+    pub alpha: Option<Alpha>,
+    /// What the file says of its numbers.
+    pub said: Said,
+    /// Bits that carry information, where the file says that there are fewer than it stores.
+    pub significant_bits: Option<u8>,
+    /// Why the picture is no frame, though it can be looked at, as in "an OpenEXR picture whose data window ...".
+    pub no_frame: Option<String>,
+}
+
+/// Opacity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alpha {
+    /// One a pixel, 0 to 1.
+    pub values: Vec<f32>,
+    /// Whether the colours are multiplied by it.
+    pub premultiplied: bool,
+}
+
+impl Alpha {
+    /// Whether any pixel is more or less transparent.
+    pub fn is_transparent(&self) -> bool {
+        self.values.iter().any(|&alpha| alpha < 1.0)
+    }
 }
 
 /// Values of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
-    /// 8 bits (or fewer, stretched to 8).
+    /// Up to 8 bits.
     U8(Vec<u8>),
-    /// 16 bits.
+    /// Up to 16 bits.
     U16(Vec<u16>),
-    /// Floating point; may hold NaN and infinities.
+    /// Floating point, may hold NaN and infinities; or integers of more than 16 bits as fractions of full scale.
     F32(Vec<f32>),
+}
+
+impl Values {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(values) => values.len(),
+            Self::U16(values) => values.len(),
+            Self::F32(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Picture {
+    /// A picture of which the file says nothing but the numbers.
+    pub(crate) fn plain(size: [usize; 2], channels: usize, values: Values, full_scale: f32) -> Self {
+        let [width, height] = size;
+        Self {
+            width,
+            height,
+            channels,
+            values,
+            full_scale,
+            alpha: None,
+            said: Said::default(),
+            significant_bits: None,
+            no_frame: None,
+        }
+    }
+
+    /// Value `index` as a fraction of full scale; as it is where there is no ceiling.
+    pub(crate) fn fraction(&self, index: usize) -> f32 {
+        let value = match &self.values {
+            Values::U8(values) => f32::from(values[index]),
+            Values::U16(values) => f32::from(values[index]),
+            Values::F32(values) => values[index],
+        };
+        if self.full_scale.is_finite() { value / self.full_scale } else { value }
+    }
 }
 
 /// File formats, told apart by their first bytes.
@@ -59,15 +129,15 @@ impl Format {
 /// What a reader of pictures asks for when it gets something else.
 const PICTURES: &str = "a PNG, JPEG, TIFF or OpenEXR file";
 
-/// Decodes PNG, JPEG, TIFF or EXR (R, G, B or Y of the first layer). Palettes are expanded, alpha is left out.
+/// Decodes PNG, JPEG, TIFF or EXR (R, G, B or Y of its one layer). Palettes are expanded.
 ///
 /// # Errors
 /// Anything that is no sound picture of grey or RGB; never panics.
 pub fn decode_picture(bytes: &[u8]) -> Result<Picture, PictureError> {
     match Format::sniff(bytes) {
-        Some(Format::Png) => guarded(|| decode_png(bytes)),
-        Some(Format::Jpeg) => guarded(|| decode_jpeg(bytes)),
-        Some(Format::Tiff) => guarded(|| decode_tiff(bytes)),
+        Some(Format::Png) => guarded(|| png_in::decode(bytes)),
+        Some(Format::Jpeg) => guarded(|| jpeg_in::decode(bytes)),
+        Some(Format::Tiff) => guarded(|| tiff_in::decode(bytes)),
         Some(Format::Exr) => exr_in::decode_exr(bytes)?.into_picture(),
         None => Err(not_a_picture(bytes, PICTURES)),
     }
@@ -83,30 +153,11 @@ pub fn read_picture(path: &Path) -> Result<Picture, FileError> {
     decode_picture(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
 }
 
-/// Reads a mask: whatever is not zero (nor NaN) in any channel is inside.
-///
-/// # Errors
-/// [`FileError`] with the path. Whether the size fits is the caller's to judge.
-pub fn read_mask(path: &Path) -> Result<Image<bool>, FileError> {
-    let picture = read_picture(path)?;
-    fn inside<T: Copy>(values: &[T], channels: usize, counts: impl Fn(T) -> bool) -> Vec<bool> {
-        values
-            .chunks_exact(channels)
-            .map(|pixel| pixel.iter().any(|&value| counts(value)))
-            .collect()
-    }
-    let data = match &picture.values {
-        Values::U8(values) => inside(values, picture.channels, |value| value != 0),
-        Values::U16(values) => inside(values, picture.channels, |value| value != 0),
-        Values::F32(values) => {
-            inside(values, picture.channels, |value| value != 0.0 && !value.is_nan())
-        }
-    };
-    Ok(Image { width: picture.width, height: picture.height, data })
-}
-
-/// The error for bytes of no known picture format.
+/// The error for bytes of no picture format that is read.
 pub(crate) fn not_a_picture(bytes: &[u8], expected: &'static str) -> PictureError {
+    if let Some((kind, remedy)) = kind_not_read(bytes) {
+        return PictureError::unsupported(kind, remedy);
+    }
     let head = &bytes[..bytes.len().min(4096)];
     let printable = |&&byte: &&u8| matches!(byte, b'\t' | b'\n' | b'\r' | 0x20..=0x7e | 0x80..);
     match (head.len(), head.iter().filter(printable).count()) {
@@ -121,143 +172,22 @@ pub(crate) fn not_a_picture(bytes: &[u8], expected: &'static str) -> PictureErro
     }
 }
 
-fn decode_png(bytes: &[u8]) -> Result<Picture, PictureError> {
-    let damaged = |error: png::DecodingError| PictureError::damaged(error.to_string());
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    decoder.set_transformations(png::Transformations::EXPAND);
-    decoder.set_ignore_text_chunk(true);
-    let header = decoder.read_header_info().map_err(damaged)?;
-    limits::check(header.width.into(), header.height.into(), 4, bytes.len())?;
-    decoder.set_limits(png::Limits { bytes: 64 << 20 });
-    let mut reader = decoder.read_info().map_err(damaged)?;
-    let size =
-        reader.output_buffer_size().ok_or_else(|| PictureError::damaged("its size overflows"))?;
-    let mut data = vec![0; size];
-    let frame = reader.next_frame(&mut data).map_err(damaged)?;
-    data.truncate(frame.buffer_size());
-    let (width, height, stored) =
-        (frame.width as usize, frame.height as usize, frame.color_type.samples());
-    let values = match frame.bit_depth {
-        png::BitDepth::Sixteen => {
-            let words: Vec<u16> =
-                data.as_chunks().0.iter().map(|&two| u16::from_be_bytes(two)).collect();
-            Values::U16(without_alpha(words, stored))
-        }
-        _ => Values::U8(without_alpha(data, stored)),
-    };
-    Ok(Picture { width, height, channels: color_channels(stored), values })
-}
-
 /// Colour channels among the stored ones: grey and grey-alpha have one, RGB and RGBA three.
-fn color_channels(stored: usize) -> usize {
+pub(super) fn color_channels(stored: usize) -> usize {
     if stored < 3 { 1 } else { 3 }
 }
 
-fn without_alpha<T: Copy>(values: Vec<T>, stored: usize) -> Vec<T> {
-    match stored {
-        2 | 4 => {
-            values.chunks_exact(stored).flat_map(|pixel| &pixel[..stored - 1]).copied().collect()
-        }
-        _ => values,
-    }
-}
-
-fn decode_jpeg(bytes: &[u8]) -> Result<Picture, PictureError> {
-    use image::{ColorType, ImageDecoder, codecs::jpeg::JpegDecoder};
-    let damaged = |error: image::ImageError| PictureError::damaged(error.to_string());
-    let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(damaged)?;
-    let (width, height) = decoder.dimensions();
-    let channels = match decoder.color_type() {
-        ColorType::L8 => 1,
-        ColorType::Rgb8 => 3,
-        other => {
-            return Err(PictureError::unsupported(
-                format!("a JPEG of {other:?}"),
-                "save it as grey or RGB",
-            ));
-        }
-    };
-    limits::check(width.into(), height.into(), channels, bytes.len())?;
-    let mut data = vec![0; width as usize * height as usize * channels];
-    decoder.read_image(&mut data).map_err(damaged)?;
-    Ok(Picture {
-        width: width as usize,
-        height: height as usize,
-        channels,
-        values: Values::U8(data),
-    })
-}
-
-fn decode_tiff(bytes: &[u8]) -> Result<Picture, PictureError> {
-    use tiff::ColorType::{Gray, GrayA, RGB, RGBA};
-    use tiff::decoder::{Decoder, DecodingResult};
-    let damaged = |error: tiff::TiffError| PictureError::damaged(error.to_string());
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(damaged)?;
-    let (width, height) = decoder.dimensions().map_err(damaged)?;
-    let stored = match decoder.colortype().map_err(damaged)? {
-        Gray(_) => 1,
-        GrayA(_) => 2,
-        RGB(_) => 3,
-        RGBA(_) => 4,
-        other => {
-            return Err(PictureError::unsupported(
-                format!("a TIFF of {other:?}"),
-                "save it as 16-bit grey or RGB",
-            ));
-        }
-    };
-    limits::check(width.into(), height.into(), stored, bytes.len())?;
-    check_tiff_kind(&mut decoder, stored)?;
-    let mut decoder = decoder.with_limits(tiff_limits(width as usize * height as usize * stored));
-    let values = match decoder.read_image().map_err(damaged)? {
-        DecodingResult::U8(values) => Values::U8(without_alpha(values, stored)),
-        DecodingResult::U16(values) => Values::U16(without_alpha(values, stored)),
-        DecodingResult::F32(values) => Values::F32(without_alpha(values, stored)),
-        _ => {
-            let what = "a TIFF of neither 8 nor 16 bits nor 32-bit float";
-            return Err(PictureError::unsupported(what, "save it with 16 bits"));
-        }
-    };
-    let (width, height, channels) = (width as usize, height as usize, color_channels(stored));
-    let found = match &values {
-        Values::U8(values) => values.len(),
-        Values::U16(values) => values.len(),
-        Values::F32(values) => values.len(),
-    };
-    if found != width * height * channels {
-        return Err(PictureError::damaged(format!(
-            "it holds {found} values for {width} x {height} pixels"
-        )));
-    }
-    Ok(Picture { width, height, channels, values })
-}
-
-fn tiff_limits(samples: usize) -> tiff::decoder::Limits {
-    let mut limits = tiff::decoder::Limits::default();
-    limits.decoding_buffer_size = limits.decoding_buffer_size.max(4 * samples);
-    limits.intermediate_buffer_size = limits.intermediate_buffer_size.max(4 * samples);
-    limits
-}
-
-/// Refuses what would come out negative or as one channel of several.
-fn check_tiff_kind(
-    decoder: &mut tiff::decoder::Decoder<Cursor<&[u8]>>,
+/// Colours and, where there are two or four channels, opacity: the last of them, straight.
+pub(super) fn split_alpha<T: Copy>(
+    values: Vec<T>,
     stored: usize,
-) -> Result<(), PictureError> {
-    use tiff::tags::Tag;
-    let mut number =
-        |tag, absent| decoder.find_tag_unsigned::<u32>(tag).ok().flatten().unwrap_or(absent);
-    if number(Tag::PhotometricInterpretation, 1) == 0 {
-        return Err(PictureError::unsupported(
-            "a TIFF in which white is zero",
-            "save it with black as zero",
-        ));
+    opacity: impl Fn(T) -> f32,
+) -> (Vec<T>, Option<Alpha>) {
+    if !matches!(stored, 2 | 4) {
+        return (values, None);
     }
-    if stored > 1 && number(Tag::PlanarConfiguration, 1) != 1 {
-        return Err(PictureError::unsupported(
-            "a TIFF of separate colour planes",
-            "save it with interleaved channels",
-        ));
-    }
-    Ok(())
+    let pixels = || values.chunks_exact(stored);
+    let alpha = pixels().map(|pixel| opacity(pixel[stored - 1])).collect();
+    let colors = pixels().flat_map(|pixel| &pixel[..stored - 1]).copied().collect();
+    (colors, Some(Alpha { values: alpha, premultiplied: false }))
 }

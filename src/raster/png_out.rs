@@ -181,7 +181,7 @@ mod tests {
                 .collect();
             assert_eq!(
                 read(&path),
-                Picture { width, height, channels: 3, values: Values::U16(expected) }
+                Picture::plain([width, height], 3, Values::U16(expected), 65_535.0)
             );
             write_png_grey16(&path, [width, height], PngContent::Data, |y, row| {
                 row.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = value(x, y, 0));
@@ -190,13 +190,13 @@ mod tests {
             let expected = (0..width * height).map(|i| value(i % width, i / width, 0)).collect();
             assert_eq!(
                 read(&path),
-                Picture { width, height, channels: 1, values: Values::U16(expected) }
+                Picture::plain([width, height], 1, Values::U16(expected), 65_535.0)
             );
             let data: Vec<u8> = (0..width * height).map(|i| (i * 37 % 256) as u8).collect();
             write_png_grey8(&path, &Image { width, height, data: data.clone() }).unwrap();
             assert_eq!(
                 read(&path),
-                Picture { width, height, channels: 1, values: Values::U8(data) }
+                Picture::plain([width, height], 1, Values::U8(data), 255.0)
             );
         }
     }

@@ -12,6 +12,17 @@ pub enum DecodeError {
         "an 8-bit picture does not say how it encodes light; declare encoding = \"linear\" or \"srgb\""
     )]
     EncodingUndeclared,
+    /// The file names a curve that cannot be applied.
+    #[error(
+        "{by} says how the picture encodes light, but {why}; declare encoding = \"linear\" or \"srgb\", or save the picture as \
+         sRGB or linear"
+    )]
+    EncodingUnreadable {
+        /// As in "its ICC profile".
+        by: String,
+        /// As in "it holds lookup tables instead of a curve".
+        why: String,
+    },
     /// A declared encoding that the format excludes.
     #[error("{format} holds linear values; remove encoding = \"srgb\"")]
     EncodingContradicted {

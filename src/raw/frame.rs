@@ -1,3 +1,4 @@
+use super::Encoding;
 use weavelight_calibration::description::Cfa;
 
 /// One decoded frame: the decoder's visible area, linear, nothing subtracted, nothing clipped.
@@ -68,4 +69,21 @@ pub struct Metadata {
     pub camera_from_xyz: Option<[[f64; 3]; 3]>,
     /// Exif orientation; recorded, never applied.
     pub orientation: Option<u16>,
+    /// What a picture file says of its numbers; of a RAW file nothing.
+    pub numbers: Numbers,
+}
+
+/// What a picture file says of its numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Numbers {
+    /// A picture of integers: its samples may clip below its full scale.
+    pub may_clip_below: bool,
+    /// Bits that carry information, where the file says that there are fewer than it stores, and the samples are as stored.
+    pub significant_bits: Option<u8>,
+    /// The encoding that the file names and that was applied, where it is one of the two with a name.
+    pub encoding: Option<Encoding>,
+    /// Both words, where the declared encoding is not the file's, as in "its sRGB chunk says sRGB, declared is linear".
+    pub contradiction: Option<String>,
+    /// Linear Rec. 709 from the picture's linear RGB, three rows that sum to 1, where the file says its primaries.
+    pub linear_srgb_from_rgb: Option<[[f64; 3]; 3]>,
 }

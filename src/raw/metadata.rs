@@ -1,6 +1,6 @@
 //! What a file says of the camera.
 
-use super::Metadata;
+use super::{Metadata, Numbers};
 use super::tags::{Directory, Tiff, tag};
 use std::io::Cursor;
 
@@ -21,6 +21,7 @@ pub(crate) fn from_tiff(tiff: &Tiff) -> Metadata {
         orientation: tiff.directories[0]
             .integer(tag::ORIENTATION)
             .and_then(|value| value.try_into().ok()),
+        numbers: Numbers::default(),
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod bits;
 mod camera;
+mod ceiling;
 mod demosaic;
 mod dng;
 mod error;
@@ -23,10 +24,12 @@ mod tags;
 mod tests;
 mod unpack;
 
+pub use ceiling::{Ceiling, Histogram};
 pub use demosaic::demosaic;
 pub use error::{DecodeError, ReadError};
-pub use frame::{Frame, Layout, Metadata, Samples};
+pub use frame::{Frame, Layout, Metadata, Numbers, Samples};
 pub use hint::{Encoding, Hint};
+pub use picture::contradictions;
 pub use preview::preview;
 pub use read::{Source, read, read_all, read_source};
 

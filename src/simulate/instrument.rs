@@ -143,6 +143,7 @@ impl Instrument {
         Color {
             black_level: Some(sensor.black.map(f64::from)),
             saturation_level: Some(f64::from(sensor.saturation)),
+            clip_level: None,
             response: if sensor.bend == 0.0 {
                 vec![0.0, 1.0]
             } else {

@@ -99,12 +99,6 @@ pub enum SolveError {
         /// The mask.
         path: PathBuf,
     },
-    /// A mask without a white pixel.
-    #[error("{} leaves nothing to solve; paint the swatch white", .path.display())]
-    EmptyMask {
-        /// The mask.
-        path: PathBuf,
-    },
     /// A light without strength in a channel that the frames have.
     #[error("{}: light {light} has no intensity in channel {channel}; calibrate it again, or leave out its frames", .path.display())]
     DarkChannel {

@@ -7,8 +7,8 @@ use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
 use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
-use crate::raster::{Values, decode_picture};
-use crate::raw::{Frame, ReadError};
+use crate::raster::decode_mask;
+use crate::raw::{Frame, Histogram, ReadError, contradictions};
 use crate::session::{FrameEntry, Kind, Session, SessionError};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ pub fn load_scene(session: &Path, calibration: &Path) -> Result<(Scene, Vec<Stri
 pub(crate) fn load(
     options: &Options,
     session: &Session,
-    calibration: Calibration,
+    mut calibration: Calibration,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Loaded, SolveError> {
     check_folders(session, &calibration)?;
@@ -51,6 +51,10 @@ pub(crate) fn load(
     warnings.extend(stale_lights(&calibration)?);
     let frames = read_frames(session, progress)?;
     warnings.extend(other_optics(session, &frames, &calibration));
+    let numbers = session.frames.iter().zip(&frames);
+    let numbers = numbers.map(|(entry, frame)| (entry.file.as_path(), &frame.metadata.numbers));
+    warnings.extend(contradictions(numbers));
+    warnings.extend(find_ceiling(&frames, &mut calibration));
     let (drift, frames): (Vec<_>, Vec<_>) =
         session.frames.iter().zip(frames).partition(|(entry, _)| entry.drift_check);
     let mut scene = arrange(session, calibration, frames);
@@ -168,6 +172,16 @@ fn other_optics(session: &Session, frames: &[Frame], calibration: &Calibration) 
     found.iter().map(tell).collect()
 }
 
+/// Where pictures of other programs clip, unless the calibration says.
+fn find_ceiling(frames: &[Frame], calibration: &mut Calibration) -> Option<String> {
+    if calibration.color.saturation_level.is_some() {
+        return None;
+    }
+    let ceiling = Histogram::of(frames)?.ceiling()?;
+    calibration.color.clip_level = Some(ceiling.level.into());
+    Some(ceiling.sentence())
+}
+
 /// Decodes every frame, several at once; in the manifest's order.
 fn read_frames(
     session: &Session,
@@ -251,28 +265,18 @@ fn arrange(
     }
 }
 
-/// Any picture of the frames' size; what is not black is inside.
+/// A picture of the frames' size; see [`decode_mask`].
 pub(super) fn read_mask(path: &Path, scene: &Scene) -> Result<Image<bool>, SolveError> {
     let bytes =
         std::fs::read(path).map_err(|source| crate::files::FileError::read(path, source))?;
-    let picture = decode_picture(&bytes)
+    let mask = decode_mask(&bytes)
         .map_err(|source| ReadError::Decode { path: path.to_owned(), source: source.into() })?;
-    if (picture.width, picture.height) != scene.size_px() {
+    if (mask.width, mask.height) != scene.size_px() {
         return Err(SolveError::OtherMask {
             path: path.to_owned(),
-            mask: format!("{} x {}", picture.width, picture.height),
+            mask: format!("{} x {}", mask.width, mask.height),
             frames: format!("{} x {}", scene.width, scene.height),
         });
     }
-    let bright: Vec<bool> = match &picture.values {
-        Values::U8(values) => values.iter().map(|&v| v != 0).collect(),
-        Values::U16(values) => values.iter().map(|&v| v != 0).collect(),
-        Values::F32(values) => values.iter().map(|&v| v > 0.0).collect(),
-    };
-    let data: Vec<bool> =
-        bright.chunks_exact(picture.channels).map(|pixel| pixel.contains(&true)).collect();
-    if !data.contains(&true) {
-        return Err(SolveError::EmptyMask { path: path.to_owned() });
-    }
-    Ok(Image { width: scene.width, height: scene.height, data })
+    Ok(mask)
 }

@@ -185,6 +185,7 @@ impl<'a> Blocks<'a> {
         Color {
             black_level: None,
             saturation_level: None,
+            clip_level: None,
             response: vec![0.0, 1.0],
             noise: color.noise.map(calmer),
             ..color.clone()

@@ -11,8 +11,9 @@ pub(crate) struct Reading<'a> {
     channels: usize,
     /// Per place of the 2 x 2 cell.
     black: [f32; 4],
+    /// From here on a sample is clipped.
     saturation: [f32; 4],
-    /// Saturation - black: raw numbers from 0 to 1.
+    /// End of the range - black: raw numbers from 0 to 1.
     range: [f32; 4],
     response: Option<Vec<f32>>,
 }
@@ -27,6 +28,8 @@ impl<'a> Reading<'a> {
             range if range.is_finite() => range,
             _ => 1.0,
         });
+        let clip_level = color.clip_level.map_or(f32::INFINITY, |level| level as f32);
+        let saturation = saturation.map(|level| level.min(clip_level));
         let is_linear = matches!(color.response.as_slice(), [] | [0.0, 1.0]);
         let response = (!is_linear).then(|| color.response.iter().map(|&c| c as f32).collect());
         Self { frame, channels: frame.layout.channels(), black, saturation, range, response }
@@ -195,4 +198,34 @@ pub(crate) fn intensity_of_places(layout: Layout, channel: usize, intensity: [f6
 
 fn grey_sum() -> f64 {
     GREY.iter().map(|&w| f64::from(w)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raw::Metadata;
+
+    /// The level at which samples clip ends what counts, and leaves the scale alone.
+    #[test]
+    fn samples_that_clip_below_the_range_do_not_count() {
+        let frame = Frame {
+            width: 4,
+            height: 1,
+            layout: Layout::Grey,
+            samples: Samples::U16(vec![100, 4094, 4095, 5000]),
+            black: [0.0; 4],
+            saturation: [65_535.0; 4],
+            metadata: Metadata::default(),
+        };
+        let color = Color { clip_level: Some(4095.0), ..Color::default() };
+        let reading = Reading::new(&frame, &color);
+        let mut row = [0.0; 4];
+        reading.row(0, 0, 0..4, [65_535.0; 4], &mut row);
+        assert_eq!(&row[..2], [100.0, 4094.0]);
+        assert!(row[2].is_nan() && row[3].is_nan() && reading.exact(2, 0, 0).is_nan());
+        assert_eq!(reading.range(), [65_535.0; 4]);
+        let mut saturated = [false; 4];
+        reading.mark_saturated(0, 0..4, &mut saturated);
+        assert_eq!(saturated, [false, false, true, true]);
+    }
 }

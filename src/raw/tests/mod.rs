@@ -1,5 +1,6 @@
 mod builder;
 mod dng;
+mod encodings;
 mod ljpeg;
 mod mutations;
 mod nef;

@@ -3,12 +3,14 @@
 
 mod lights;
 mod natural;
+mod numbers;
 mod pairs;
 mod pictures;
 #[cfg(test)]
 mod tests;
 
 use self::lights::{LightList, Named};
+use self::numbers::{Gathered, encoding_of};
 use self::pairs::Pair;
 use self::pictures::Frame;
 use super::{Encoding, FrameEntry, Kind, Session, SessionError};
@@ -16,7 +18,6 @@ use crate::files::{
     FileError, Input, OutputKind, Provenance, StagedFolder, sha256_hex, sha256_of_file,
 };
 use crate::instrument::{CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights};
-use nalgebra::Matrix3;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::{DirectionalLight, Light};
@@ -69,6 +70,16 @@ pub enum ImportError {
     /// An 8-bit picture whose encoding is not declared.
     #[error("{}: has 8 bits and does not say how they encode light; add --encoding srgb (most cameras) or --encoding linear", .0.display())]
     EncodingUnknown(PathBuf),
+    /// A picture whose file names a curve that cannot be applied.
+    #[error("{}: {by} says how it encodes light, but {why}; add --encoding srgb or --encoding linear, or save it as sRGB or linear", .path.display())]
+    EncodingUnreadable {
+        /// The picture.
+        path: PathBuf,
+        /// As in "its ICC profile".
+        by: String,
+        /// As in "it holds lookup tables instead of a curve".
+        why: String,
+    },
     /// Directions and pictures do not pair.
     #[error("{}: {lights} directions, but {what}; give one picture for each direction", .path.display())]
     Count {
@@ -128,12 +139,15 @@ pub fn run(options: &Options, progress: &dyn Fn(f64, &str)) -> Result<Summary, I
     let mut session = Session::new(staged.path(), Kind::Swatch, name);
     let mut names = Names::default();
     let mut first: Option<(PathBuf, [usize; 2])> = None;
+    let mut gathered = Gathered::default();
     for (k, pair) in pairs.iter().enumerate() {
         progress(k as f64 / count as f64, "copying pictures");
         let picture = pictures::read_frame(&pair.image, options.encoding)?;
         let (path, expected) = first.get_or_insert_with(|| (pair.image.clone(), picture.size_px));
         check_size(&pair.image, picture.size_px, path, *expected)?;
-        session.frames.push(add_frame(&staged, &mut names, pair, &picture, options.encoding)?);
+        let encoding = options.encoding.or_else(|| encoding_of(&picture.numbers));
+        session.frames.push(add_frame(&staged, &mut names, pair, &picture, encoding)?);
+        gathered.add(&pair.image, &picture.numbers, picture.histogram);
     }
     let size_px = first.map_or([0, 0], |(_, size)| size);
     if let Some(mask) = &options.mask {
@@ -144,7 +158,8 @@ pub fn run(options: &Options, progress: &dyn Fn(f64, &str)) -> Result<Summary, I
         session.mask = Some(name.into());
     }
     session.save()?;
-    write_calibration(&staged.join(CALIBRATION), &list, &pairs, options)?;
+    warnings.extend(gathered.warnings());
+    write_calibration(&staged.join(CALIBRATION), &list, &pairs, &gathered.color())?;
     let target = staged.target().to_owned();
     staged.commit()?;
     progress(1.0, "done");
@@ -212,7 +227,7 @@ fn write_calibration(
     folder: &Path,
     list: &LightList,
     pairs: &[Pair],
-    options: &Options,
+    color: &Color,
 ) -> Result<(), ImportError> {
     let light = |k: usize| {
         let far =
@@ -227,10 +242,7 @@ fn write_calibration(
     }
     let provenance = Provenance::of_this_program(None, inputs, toml::Table::new());
     write_lights(folder, &lights, &provenance)?;
-    // sRGB pictures come in sRGB's primaries; of others nothing is known.
-    let known = options.encoding == Some(Encoding::Srgb);
-    let color = Color { camera_to_linear_srgb: known.then(Matrix3::identity), ..Color::default() };
-    write_color(folder, &color, &provenance)?;
+    write_color(folder, color, &provenance)?;
     Ok(())
 }
 

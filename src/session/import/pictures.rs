@@ -2,8 +2,8 @@
 
 use super::{Encoding, ImportError};
 use crate::files::FileError;
-use crate::raster::{Values, decode_picture};
-use crate::raw::{self, DecodeError, Hint};
+use crate::raster;
+use crate::raw::{self, DecodeError, Hint, Histogram, Numbers};
 use image::{ColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::path::Path;
 
@@ -13,6 +13,10 @@ pub(super) struct Frame {
     pub(super) bytes: Vec<u8>,
     /// Width and height.
     pub(super) size_px: [usize; 2],
+    /// What its file says of its numbers.
+    pub(super) numbers: Numbers,
+    /// How often each number occurs, where its file leaves it open where samples clip.
+    pub(super) histogram: Option<Histogram>,
 }
 
 /// Reads a picture, and decodes it as a solve will: what cannot be solved is not imported.
@@ -25,9 +29,17 @@ pub(super) fn read_frame(path: &Path, encoding: Option<Encoding>) -> Result<Fram
     let frame =
         raw::decode(&bytes, &Hint { cfa: None, encoding }).map_err(|error| match error {
             DecodeError::EncodingUndeclared => ImportError::EncodingUnknown(path.to_owned()),
+            DecodeError::EncodingUnreadable { by, why } => {
+                ImportError::EncodingUnreadable { path: path.to_owned(), by, why }
+            }
             error => FileError::Content { path: path.to_owned(), what: error.to_string() }.into(),
         })?;
-    Ok(Frame { size_px: [frame.width, frame.height], bytes })
+    Ok(Frame {
+        size_px: [frame.width, frame.height],
+        histogram: Histogram::of_frame(&frame),
+        numbers: frame.metadata.numbers,
+        bytes,
+    })
 }
 
 /// A mask: 255 inside, 0 outside.
@@ -38,22 +50,13 @@ pub(super) struct Mask {
     pub(super) size_px: [usize; 2],
 }
 
-/// Reads any picture as a mask: what is not black is inside.
+/// Reads any picture as a mask; see [`raster::decode_mask`].
 pub(super) fn read_mask(path: &Path) -> Result<Mask, FileError> {
     let bytes = std::fs::read(path).map_err(|source| FileError::read(path, source))?;
-    let picture = decode_picture(&bytes)
+    let mask = raster::decode_mask(&bytes)
         .map_err(|error| FileError::Content { path: path.to_owned(), what: error.to_string() })?;
-    let inside = match &picture.values {
-        Values::U8(values) => not_black(values, picture.channels),
-        Values::U16(values) => not_black(values, picture.channels),
-        Values::F32(values) => not_black(values, picture.channels),
-    };
-    Ok(Mask { inside, size_px: [picture.width, picture.height] })
-}
-
-fn not_black<T: PartialOrd + Default>(values: &[T], channels: usize) -> Vec<u8> {
-    let inside = |pixel: &[T]| pixel.iter().any(|value| *value > T::default());
-    values.chunks_exact(channels).map(|pixel| if inside(pixel) { 255 } else { 0 }).collect()
+    let inside = mask.data.iter().map(|&inside| if inside { 255 } else { 0 }).collect();
+    Ok(Mask { inside, size_px: [mask.width, mask.height] })
 }
 
 impl Mask {

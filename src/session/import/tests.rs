@@ -1,5 +1,7 @@
 use super::*;
 use crate::instrument::Calibration;
+use crate::raster::{PngContent, write_png_grey16, write_png_rgb16};
+use nalgebra::Matrix3;
 use std::fs;
 
 /// A folder of small pictures `names` (16 bits unless the name begins with an 8) beside a light list.
@@ -255,4 +257,76 @@ fn a_capture_session_is_never_replaced() {
     set.import(&options).unwrap();
     let error = run(&options, &|_, _| {}).unwrap_err().to_string();
     assert!(error.contains("a capture session is never replaced"), "{error}");
+}
+
+#[test]
+fn pictures_that_say_their_encoding_are_read_by_it() {
+    let names = ["a.png", "b.png", "c.png"];
+    let set = Set::new("lights.txt", DIRECTIONS, &names);
+    for name in names {
+        write_png_rgb16(&set.path(name), [4, 3], PngContent::Srgb, |y, row| {
+            row.fill([1000 * y as u16; 3]);
+        })
+        .unwrap();
+    }
+    let mut options = set.options("lights.txt", &names);
+    let (session, summary) = set.import(&options).unwrap();
+    assert!(session.frames.iter().all(|frame| frame.encoding == Some(Encoding::Srgb)));
+    assert_eq!(summary.warnings, Vec::<String>::new());
+    let color = Calibration::load(&summary.calibration).unwrap().color;
+    assert_eq!(color.camera_to_linear_srgb, Some(Matrix3::identity()));
+    fs::remove_dir_all(set.path("out")).unwrap();
+    options.encoding = Some(Encoding::Linear);
+    let (session, summary) = set.import(&options).unwrap();
+    assert!(session.frames.iter().all(|frame| frame.encoding == Some(Encoding::Linear)));
+    let [warning] = &summary.warnings[..] else { panic!("{:?}", summary.warnings) };
+    let expected = "a.png (and 2 others): its sRGB chunk says sRGB, declared is linear. ";
+    assert!(warning.contains(expected), "{warning}");
+}
+
+#[test]
+fn twelve_bits_in_sixteen_clip_at_4095() {
+    let names = ["a.png", "b.png", "c.png"];
+    let import = |peak: f64, most: f64| {
+        let set = Set::new("lights.txt", DIRECTIONS, &names);
+        for (k, name) in names.iter().enumerate() {
+            write_png_grey16(&set.path(name), [90, 90], PngContent::Data, |y, row| {
+                row.iter_mut().enumerate().for_each(|(x, out)| {
+                    let (x, y) = (x as f64 / 45.0 - 1.0, y as f64 / 45.0 - 1.0);
+                    let cosine = (1.0 - x * x - y * y).max(0.0).sqrt();
+                    *out = (peak * cosine * (1.0 - 0.1 * k as f64)).min(most) as u16;
+                });
+            })
+            .unwrap();
+        }
+        let (_, summary) = set.import(&set.options("lights.txt", &names)).unwrap();
+        let color = Calibration::load(&summary.calibration).unwrap().color;
+        (color.saturation_level, summary.warnings)
+    };
+    let (level, warnings) = import(5000.0, 4095.0);
+    assert_eq!(level, Some(4095.0));
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    let expected = "The pictures clip at 4095 (12 bits in a file of more), not at 65535: ";
+    assert!(warning.starts_with(expected), "{warning}");
+    assert_eq!(import(4000.0, 4095.0), (None, vec![]));
+    assert_eq!(import(50_000.0, 65_535.0), (None, vec![]));
+}
+
+#[test]
+fn a_mask_that_is_transparent_outside() {
+    let set = Set::new("lights.txt", DIRECTIONS, &["a.png", "b.png", "c.png"]);
+    let inside = |x: u32| x >= 2;
+    image::ImageBuffer::from_fn(4, 3, |x, _| image::Rgba([255_u8, 255, 255, if inside(x) { 255 } else { 0 }]))
+        .save(set.path("mask.png"))
+        .unwrap();
+    let mut options = set.options("lights.txt", &["a.png", "b.png", "c.png"]);
+    options.mask = Some(set.path("mask.png"));
+    let (session, _) = set.import(&options).unwrap();
+    let mask = image::open(session.mask_path().unwrap()).unwrap();
+    let pixels = mask.as_luma8().unwrap().enumerate_pixels();
+    assert!(pixels.into_iter().all(|(x, _, pixel)| pixel.0 == [if inside(x) { 255 } else { 0 }]));
+    image::RgbaImage::new(4, 3).save(set.path("mask.png")).unwrap();
+    fs::remove_dir_all(set.path("out")).unwrap();
+    let error = set.import(&options).unwrap_err();
+    assert!(error.starts_with("mask.png: the mask is transparent everywhere; "), "{error}");
 }
