@@ -2,8 +2,8 @@
 
 use super::{CompareError, Kind, has_value, is_unit};
 use crate::raster::{
-    Choice, Curve, Exr, FileError, Format, Picture, PictureError, Role, SaidCurve, Values, decode_exr,
-    decode_picture,
+    Choice, Curve, Exr, FileError, Format, Picture, PictureError, Role, SaidCurve, Values,
+    decode_exr, decode_picture,
 };
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::Image;
@@ -127,7 +127,8 @@ fn of_exr(exr: &Exr, kind: Kind) -> Result<Vec<[f32; 3]>, PictureError> {
     };
     let group = exr.choose(choice)?;
     let [r, g, b] = exr.planes(&group);
-    let mut pixels: Vec<[f32; 3]> = r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
+    let mut pixels: Vec<[f32; 3]> =
+        r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [r, g, b]).collect();
     if kind == Kind::Normal {
         return Ok(pixels);
     }
@@ -183,7 +184,10 @@ fn colors(picture: &Picture, format: Format) -> Result<Vec<[f32; 3]>, PictureErr
     let curve = match &picture.said.curve {
         SaidCurve::Known(curve) => curve.clone(),
         SaidCurve::Unreadable(why) => {
-            let what = format!("a picture of which {} says how it encodes colour ({why})", picture.said.by);
+            let what = format!(
+                "a picture of which {} says how it encodes colour ({why})",
+                picture.said.by
+            );
             return Err(PictureError::unsupported(what, "convert it to sRGB"));
         }
         SaidCurve::Silent if whole => Curve::Linear,

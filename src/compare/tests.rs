@@ -57,12 +57,12 @@ impl Home {
 
     fn compare(&self, a: &str, b: &str, kind: Option<Kind>) -> Result<Figures, String> {
         let (a, b) = (self.path(a), self.path(b));
-        run(&Options { a, b, mask: None, kind })
-            .map(|comparison| comparison.figures)
-            .map_err(|error| {
+        run(&Options { a, b, mask: None, kind }).map(|comparison| comparison.figures).map_err(
+            |error| {
                 assert!(error.to_string().contains("; "), "no remedy: {error}");
                 error.to_string()
-            })
+            },
+        )
     }
 
     /// The largest angle, degrees.
@@ -118,7 +118,8 @@ fn normals_of_integers_are_decoded_whatever_they_say_of_colour() {
         1 => [0.5; 3],
         _ => stored(k),
     });
-    let options = Options { a: home.path("a.exr"), b: home.path("holes.png"), mask: None, kind: None };
+    let options =
+        Options { a: home.path("a.exr"), b: home.path("holes.png"), mask: None, kind: None };
     let found = run(&options).unwrap();
     assert_eq!(found.left_out, 134);
     write_png_grey16(&home.path("grey.png"), SIZE, PngContent::Data, |_, row| row.fill(9)).unwrap();
@@ -140,19 +141,28 @@ fn colours_of_integers_are_decoded_by_what_the_file_says() {
         assert!(home.rms("small.png", "a.exr", kind) < 4e-3);
     }
     let data: Vec<u16> = (0..200).flat_map(|k| color(k).map(|v| (65_535.0 * v) as u16)).collect();
-    let tiff: image::ImageBuffer<image::Rgb<u16>, _> = image::ImageBuffer::from_raw(20, 10, data).unwrap();
+    let tiff: image::ImageBuffer<image::Rgb<u16>, _> =
+        image::ImageBuffer::from_raw(20, 10, data).unwrap();
     tiff.save(home.path("c.tif")).unwrap();
     let error = home.compare("a.exr", "c.tif", Some(Kind::Color)).unwrap_err();
     assert!(error.contains("c.tif: a TIFF that does not say how"), "{error}");
 }
 
 /// Data windows and primaries through the `exr` crate's writer.
-fn write_exr(path: &PathBuf, place: [i32; 2], primaries: Option<[f32; 8]>, pixel: impl Fn(usize) -> [f32; 3] + Sync) {
+fn write_exr(
+    path: &PathBuf,
+    place: [i32; 2],
+    primaries: Option<[f32; 8]>,
+    pixel: impl Fn(usize) -> [f32; 3] + Sync,
+) {
     let channels = e::SpecificChannels::rgb(|at: e::Vec2<usize>| {
         let [r, g, b] = pixel(at.y() * 20 + at.x());
         (r, g, b)
     });
-    let attributes = e::LayerAttributes { layer_position: e::Vec2(place[0], place[1]), ..e::LayerAttributes::default() };
+    let attributes = e::LayerAttributes {
+        layer_position: e::Vec2(place[0], place[1]),
+        ..e::LayerAttributes::default()
+    };
     let layer = e::Layer::new((20, 10), attributes, e::Encoding::FAST_LOSSLESS, channels);
     let mut attributes = e::ImageAttributes::new(e::IntegerBounds::new((0, 0), (20, 10)));
     attributes.chromaticities = primaries.map(|p| e::attribute::Chromaticities {
@@ -171,7 +181,12 @@ fn a_data_window_is_where_it_says() {
     home.exr("a.exr", ["R", "G", "B"], color);
     // Pixel (x, y) of the data is pixel (x + 3, y + 2) of the picture.
     write_exr(&home.path("moved.exr"), [3, 2], None, |k| color(k + 43));
-    let options = |b: &str| Options { a: home.path("a.exr"), b: home.path(b), mask: None, kind: Some(Kind::Color) };
+    let options = |b: &str| Options {
+        a: home.path("a.exr"),
+        b: home.path(b),
+        mask: None,
+        kind: Some(Kind::Color),
+    };
     let found = run(&options("moved.exr")).unwrap();
     // Rows 2 to 9, columns 3 to 19; the last pixels of a row continue in the next, where colours do too.
     assert_eq!(found.left_out, 200 - 8 * 17);
@@ -193,7 +208,11 @@ fn primaries_are_converted_for_colours_and_never_for_normals() {
     let p3 = [0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290];
     let p3_from_srgb = |[r, g, b]: [f32; 3]| {
         // CSS Color 4, inverted.
-        [0.822_462 * r + 0.177_538 * g, 0.033_194 * r + 0.966_806 * g, 0.017_083 * r + 0.072_397 * g + 0.910_520 * b]
+        [
+            0.822_462 * r + 0.177_538 * g,
+            0.033_194 * r + 0.966_806 * g,
+            0.017_083 * r + 0.072_397 * g + 0.910_520 * b,
+        ]
     };
     write_exr(&home.path("p3.exr"), [0, 0], Some(p3), |k| p3_from_srgb(color(k)));
     assert!(home.rms("a.exr", "p3.exr", Some(Kind::Color)) < 2e-5);

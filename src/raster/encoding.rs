@@ -59,7 +59,9 @@ impl Curve {
     pub(crate) fn from_tones(tones: [Tone; 3]) -> Self {
         let is = |other: &dyn Fn(f64) -> f64, slack: f64| {
             tones.iter().all(|tone| {
-                (0..=256).map(|i| f64::from(i) / 256.0).all(|x| (tone.linear(x) - other(x)).abs() <= slack)
+                (0..=256)
+                    .map(|i| f64::from(i) / 256.0)
+                    .all(|x| (tone.linear(x) - other(x)).abs() <= slack)
             })
         };
         if is(&|x| x, LINEAR_SLACK) {
@@ -115,7 +117,11 @@ impl Tone {
         match self {
             Self::Gamma(gamma) => x.max(0.0).powf(*gamma),
             Self::Parametric([g, a, b, c, d, e, f]) => {
-                if x >= *d { (a * x + b).max(0.0).powf(*g) + e } else { c * x + f }
+                if x >= *d {
+                    (a * x + b).max(0.0).powf(*g) + e
+                } else {
+                    c * x + f
+                }
             }
             Self::Table(table) => {
                 let place = x.clamp(0.0, 1.0) * (table.len() - 1) as f64;
@@ -139,7 +145,15 @@ impl Tone {
     /// ITU-R BT.709-6, 1.2, inverted.
     pub(crate) fn bt_709() -> Self {
         let [alpha, beta] = [1.099, 0.081];
-        Self::Parametric([1.0 / 0.45, 1.0 / alpha, (alpha - 1.0) / alpha, 1.0 / 4.5, beta, 0.0, 0.0])
+        Self::Parametric([
+            1.0 / 0.45,
+            1.0 / alpha,
+            (alpha - 1.0) / alpha,
+            1.0 / 4.5,
+            beta,
+            0.0,
+            0.0,
+        ])
     }
 }
 
@@ -150,7 +164,8 @@ mod tests {
     #[test]
     fn curves_are_named_by_what_they_do() {
         let three = |tone: Tone| Curve::from_tones([tone.clone(), tone.clone(), tone]);
-        let srgb = Tone::Parametric([2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045, 0.0, 0.0]);
+        let srgb =
+            Tone::Parametric([2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045, 0.0, 0.0]);
         assert_eq!(three(srgb), Curve::Srgb);
         let table = (0..1024)
             .map(|i| (65_535.0 * srgb::decode(i as f32 / 1023.0)).round() as u16)

@@ -61,7 +61,8 @@ impl Exr {
     /// A layer's opacity, where not all of it is opaque. Programs that know no alpha may write 0 everywhere.
     pub(crate) fn alpha(&self, group: &Group) -> Option<Alpha> {
         let values = &self.channels[group.alpha?].1;
-        let counts = values.iter().any(|&alpha| alpha < 1.0) && values.iter().any(|&alpha| alpha > 0.0);
+        let counts =
+            values.iter().any(|&alpha| alpha < 1.0) && values.iter().any(|&alpha| alpha > 0.0);
         counts.then(|| Alpha { values: values.clone(), premultiplied: true })
     }
 
@@ -90,7 +91,8 @@ impl Exr {
     fn no_frame(&self, group: &Group) -> Option<String> {
         let gap = group.channels.iter().find_map(|&at| self.gaps[at].clone());
         let square = (self.pixel_aspect - 1.0).abs() < 0.01;
-        let wide = || format!("an OpenEXR picture of pixels {} times as wide as high", self.pixel_aspect);
+        let wide =
+            || format!("an OpenEXR picture of pixels {} times as wide as high", self.pixel_aspect);
         gap.or_else(|| (!square).then(wide))
     }
 }
@@ -141,15 +143,19 @@ fn decode(bytes: &[u8]) -> Result<Exr, PictureError> {
         width: display.size.width(),
         height: display.size.height(),
         channels: Vec::new(),
-        chromaticities: image.attributes.chromaticities.map(|c| {
-            [c.red, c.green, c.blue, c.white].map(|at| [at.x(), at.y()].map(f64::from))
-        }),
+        chromaticities: image
+            .attributes
+            .chromaticities
+            .map(|c| [c.red, c.green, c.blue, c.white].map(|at| [at.x(), at.y()].map(f64::from))),
         pixel_aspect: image.attributes.pixel_aspect,
         gaps: Vec::new(),
     };
     for layer in image.layer_data {
         let place = layer.attributes.layer_position - display.position;
-        let window = Window { place: [place.x(), place.y()], size: [layer.size.width(), layer.size.height()] };
+        let window = Window {
+            place: [place.x(), place.y()],
+            size: [layer.size.width(), layer.size.height()],
+        };
         let part = layer.attributes.layer_name.filter(|_| several).map(|name| name.to_string());
         for channel in layer.channel_data.list {
             let name = channel.name.to_string();
@@ -223,7 +229,9 @@ impl Window {
 
     /// In words, where it leaves part of the display window empty.
     fn gap(&self, display: [usize; 2]) -> Option<String> {
-        let covers = [0, 1].into_iter().all(|axis| self.overlap(axis, display[axis]).0.len() == display[axis]);
+        let covers = [0, 1]
+            .into_iter()
+            .all(|axis| self.overlap(axis, display[axis]).0.len() == display[axis]);
         let [x, y] = self.place;
         let [width, height] = self.size;
         let what = || {

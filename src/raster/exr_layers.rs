@@ -179,7 +179,11 @@ mod tests {
         check(&["X", "Y", "Z"], Any, Ok(("", Role::Xyz)));
         check(&["X", "Y", "Z"], Colors, Err("vector or CIE XYZ"));
         check(&["L.Normal.X", "L.Normal.Y", "L.Normal.Z"], Vectors, Ok(("L.Normal", Role::Xyz)));
-        check(&["V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R"], Colors, Ok(("V.Combined", Role::Rgb)));
+        check(
+            &["V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R"],
+            Colors,
+            Ok(("V.Combined", Role::Rgb)),
+        );
         check(&["Y"], Colors, Ok(("", Role::Grey)));
         check(&["Y"], Vectors, Err("one grey channel"));
         check(&["BY", "RY", "Y"], Any, Err("luminance and chroma"));

@@ -41,8 +41,10 @@ const SIGNATURES: [(usize, &[u8], &str); 32] = [
 
 /// A kind that is not read, and what to do; `None` for what is not known by name.
 pub(crate) fn kind_not_read(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
-    let begins = |at: usize, with: &[u8]| bytes.get(at..).is_some_and(|rest| rest.starts_with(with));
-    let signed = SIGNATURES.iter().find(|(at, with, _)| begins(*at, with)).map(|(_, _, name)| *name);
+    let begins =
+        |at: usize, with: &[u8]| bytes.get(at..).is_some_and(|rest| rest.starts_with(with));
+    let signed =
+        SIGNATURES.iter().find(|(at, with, _)| begins(*at, with)).map(|(_, _, name)| *name);
     let name = signed.or_else(|| match bytes {
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("a WebP picture"),
         [b'B', b'M', ..] if is_bmp(bytes) => Some("a BMP picture"),

@@ -19,7 +19,8 @@ pub(crate) fn said_by_icc(bytes: &[u8]) -> Said {
         DataColorSpace::Rgb => [&profile.red_trc, &profile.green_trc, &profile.blue_trc],
         other => return Said::unreadable(format!("it describes {other:?}"), by),
     };
-    let [Some(red), Some(green), Some(blue)] = tones.map(|tone| tone.as_ref().and_then(tone_of)) else {
+    let [Some(red), Some(green), Some(blue)] = tones.map(|tone| tone.as_ref().and_then(tone_of))
+    else {
         return Said::unreadable("it holds lookup tables instead of a curve", by);
     };
     let colorants = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
@@ -89,9 +90,15 @@ mod tests {
         assert!((curve.linear(1, 0.5) - 0.5_f64.powf(2.2)).abs() < 1e-3, "{curve:?}");
         // Published (Lindbloom): linear sRGB from linear Adobe RGB.
         let matrix = adobe.linear_srgb_from_rgb.unwrap();
-        assert!((matrix[0][0] - 1.398_3).abs() < 2e-3 && (matrix[0][1] + 0.398_3).abs() < 2e-3, "{matrix:?}");
+        assert!(
+            (matrix[0][0] - 1.398_3).abs() < 2e-3 && (matrix[0][1] + 0.398_3).abs() < 2e-3,
+            "{matrix:?}"
+        );
         let grey = said(&ColorProfile::new_gray_with_gamma(1.0));
-        assert_eq!((grey.curve, grey.linear_srgb_from_rgb), (SaidCurve::Known(Curve::Linear), None));
+        assert_eq!(
+            (grey.curve, grey.linear_srgb_from_rgb),
+            (SaidCurve::Known(Curve::Linear), None)
+        );
     }
 
     #[test]

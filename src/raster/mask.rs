@@ -41,7 +41,9 @@ pub fn decode_mask(bytes: &[u8]) -> Result<Image<bool>, PictureError> {
     if inside.contains(&true) {
         return Ok(Image { width: picture.width, height: picture.height, data: inside });
     }
-    Err(PictureError::EmptyMask { all: if transparent.is_some() { "transparent" } else { "black" } })
+    Err(PictureError::EmptyMask {
+        all: if transparent.is_some() { "transparent" } else { "black" },
+    })
 }
 
 fn not_black(picture: &Picture, jpeg: bool) -> Vec<bool> {
@@ -92,7 +94,11 @@ mod tests {
         // Both: black is outside.
         let both = [rgba(black, 255), rgba(white, 255), rgba(white, 0)];
         check(row(&both), ImageFormat::Png, &[false, true, false]);
-        check(row(&[LumaA([65_535_u16, 65_535]), LumaA([65_535, 0])]), ImageFormat::Png, &[true, false]);
+        check(
+            row(&[LumaA([65_535_u16, 65_535]), LumaA([65_535, 0])]),
+            ImageFormat::Png,
+            &[true, false],
+        );
         // A soft edge is inside, as a dark grey is.
         check(row(&[rgba(white, 1), rgba(white, 0)]), ImageFormat::Png, &[true, false]);
     }
@@ -124,7 +130,10 @@ mod tests {
             assert!(error.contains(expected) && error.contains("; "), "{error}");
         };
         refused(&bytes(row(&[Luma([0_u8]); 3]), ImageFormat::Png), "black everywhere");
-        refused(&bytes(row(&[Rgba([9_u8, 9, 9, 0]); 3]), ImageFormat::Png), "transparent everywhere");
+        refused(
+            &bytes(row(&[Rgba([9_u8, 9, 9, 0]); 3]), ImageFormat::Png),
+            "transparent everywhere",
+        );
         refused(b"white, please", "a text file");
     }
 }

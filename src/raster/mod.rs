@@ -17,9 +17,9 @@ mod png_in;
 mod png_out;
 mod primaries;
 pub mod srgb;
-mod tiff_in;
 #[cfg(test)]
 mod tests;
+mod tiff_in;
 
 pub use encoding::{Curve, Said, SaidCurve, Tone};
 pub use error::{FileError, PictureError};
@@ -28,8 +28,8 @@ pub(crate) use exr_layers::Choice;
 pub use exr_layers::{Group, Role};
 pub use exr_out::{encode_exr, write_exr, write_exr_rgb, write_exr_y};
 pub use exr_rows::ExrRows;
-pub(crate) use picture::not_a_picture;
 pub use mask::{decode_mask, read_mask};
+pub(crate) use picture::not_a_picture;
 pub use picture::{Alpha, Format, Picture, Values, decode_picture, read_picture};
 pub use png_out::{
     PngContent, encode_png_grey8, encode_png_rgb8, write_png_grey8, write_png_grey16,

@@ -74,7 +74,12 @@ impl Values {
 
 impl Picture {
     /// A picture of which the file says nothing but the numbers.
-    pub(crate) fn plain(size: [usize; 2], channels: usize, values: Values, full_scale: f32) -> Self {
+    pub(crate) fn plain(
+        size: [usize; 2],
+        channels: usize,
+        values: Values,
+        full_scale: f32,
+    ) -> Self {
         let [width, height] = size;
         Self {
             width,

@@ -194,10 +194,7 @@ mod tests {
             );
             let data: Vec<u8> = (0..width * height).map(|i| (i * 37 % 256) as u8).collect();
             write_png_grey8(&path, &Image { width, height, data: data.clone() }).unwrap();
-            assert_eq!(
-                read(&path),
-                Picture::plain([width, height], 1, Values::U8(data), 255.0)
-            );
+            assert_eq!(read(&path), Picture::plain([width, height], 1, Values::U8(data), 255.0));
         }
     }
 

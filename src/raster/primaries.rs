@@ -20,7 +20,8 @@ const WHITE_SLACK: f64 = 0.05;
 /// Linear Rec. 709 from linear RGB of these primaries and white; `None` where they span no colours.
 pub(crate) fn linear_srgb_from(primaries: [[f64; 2]; 3], white: [f64; 2]) -> Option<[[f64; 3]; 3]> {
     let to_d65 = adaptation(xyz(white)?, xyz(D65)?)?;
-    let matrix = xyz_from_rgb(BT_709, D65)?.try_inverse()? * to_d65 * xyz_from_rgb(primaries, white)?;
+    let matrix =
+        xyz_from_rgb(BT_709, D65)?.try_inverse()? * to_d65 * xyz_from_rgb(primaries, white)?;
     tidied(matrix)
 }
 
@@ -67,9 +68,8 @@ fn xyz_from_rgb(primaries: [[f64; 2]; 3], white: [f64; 2]) -> Option<Matrix3<f64
 
 /// X, Y, Z under white `from` to X, Y, Z under white `to`.
 fn adaptation(from: Vector3<f64>, to: Vector3<f64>) -> Option<Matrix3<f64>> {
-    let bradford = Matrix3::new(
-        0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296,
-    );
+    let bradford =
+        Matrix3::new(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296);
     let gains = (bradford * to).component_div(&(bradford * from));
     Some(bradford.try_inverse()? * Matrix3::from_diagonal(&gains) * bradford)
 }
@@ -107,11 +107,8 @@ mod tests {
         ];
         check(linear_srgb_from(p3, D65), expected, 2e-5);
         let ap1 = [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]];
-        let expected = [
-            [1.7051, -0.6218, -0.0833],
-            [-0.1303, 1.1408, -0.0105],
-            [-0.0240, -0.1290, 1.1530],
-        ];
+        let expected =
+            [[1.7051, -0.6218, -0.0833], [-0.1303, 1.1408, -0.0105], [-0.0240, -0.1290, 1.1530]];
         check(linear_srgb_from(ap1, [0.32168, 0.33767]), expected, 5e-3);
     }
 

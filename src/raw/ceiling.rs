@@ -57,7 +57,12 @@ impl Histogram {
         samples.iter().for_each(|&sample| counts[usize::from(sample)] += 1);
         let largest = samples.iter().copied().max().unwrap_or(0);
         let full_scale = frame.saturation[0].clamp(0.0, 65_535.0) as u16;
-        Some(Self { counts, largest: vec![largest], full_scale, significant_bits: numbers.significant_bits })
+        Some(Self {
+            counts,
+            largest: vec![largest],
+            full_scale,
+            significant_bits: numbers.significant_bits,
+        })
     }
 
     /// Both together.
@@ -66,7 +71,8 @@ impl Histogram {
         self.counts.iter_mut().zip(&other.counts).for_each(|(count, more)| *count += more);
         self.largest.extend(other.largest);
         self.full_scale = self.full_scale.min(other.full_scale);
-        self.significant_bits = self.significant_bits.filter(|bits| other.significant_bits == Some(*bits));
+        self.significant_bits =
+            self.significant_bits.filter(|bits| other.significant_bits == Some(*bits));
         self
     }
 
@@ -85,7 +91,8 @@ impl Histogram {
         let low = ((1_u32 << bits) - 1) as u16;
         let high = low << spare;
         let scaled = |value: u16| value & !high == 0 || value & !high == value >> bits & !high;
-        let all_scaled = (0..=largest).all(|value| self.counts[usize::from(value)] == 0 || scaled(value));
+        let all_scaled =
+            (0..=largest).all(|value| self.counts[usize::from(value)] == 0 || scaled(value));
         if largest <= low && !(all_scaled && largest > 0) {
             return Some(low);
         }
@@ -143,7 +150,8 @@ mod tests {
     use crate::raw::{Layout, Metadata, Numbers};
 
     fn frame(samples: Vec<u16>, bits: Option<u8>) -> Frame {
-        let numbers = Numbers { may_clip_below: true, significant_bits: bits, ..Numbers::default() };
+        let numbers =
+            Numbers { may_clip_below: true, significant_bits: bits, ..Numbers::default() };
         Frame {
             width: samples.len(),
             height: 1,
@@ -168,7 +176,13 @@ mod tests {
     }
 
     fn shot(peak: f64, step: f64, most: f64) -> Frame {
-        frame(sphere(peak).iter().map(|v| ((v / step).floor() * step).clamp(0.0, most) as u16).collect(), None)
+        frame(
+            sphere(peak)
+                .iter()
+                .map(|v| ((v / step).floor() * step).clamp(0.0, most) as u16)
+                .collect(),
+            None,
+        )
     }
 
     fn check(frames: &[Frame], expected: Option<u16>) {

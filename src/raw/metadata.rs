@@ -1,7 +1,7 @@
 //! What a file says of the camera.
 
-use super::{Metadata, Numbers};
 use super::tags::{Directory, Tiff, tag};
+use super::{Metadata, Numbers};
 use std::io::Cursor;
 
 /// From the directories of a RAW file or TIFF.

@@ -26,7 +26,8 @@ pub(crate) fn decode(
     let (samples, saturation) = match picture.values {
         Values::F32(values) if curve == Curve::Linear => (Samples::F32(values), full_scale),
         Values::F32(values) => {
-            let light = |(k, value): (usize, f32)| curve.linear(k % picture.channels, value.into()) as f32;
+            let light =
+                |(k, value): (usize, f32)| curve.linear(k % picture.channels, value.into()) as f32;
             (Samples::F32(values.into_iter().enumerate().map(light).collect()), full_scale)
         }
         Values::U16(values) if curve == Curve::Linear => (Samples::U16(values), full_scale),
@@ -37,7 +38,8 @@ pub(crate) fn decode(
         }
         Values::U8(values) => {
             let tables = tables(&curve, full_scale);
-            let light = |(k, &value): (usize, &u8)| tables[k % picture.channels][usize::from(value)];
+            let light =
+                |(k, &value): (usize, &u8)| tables[k % picture.channels][usize::from(value)];
             (Samples::U16(values.iter().enumerate().map(light).collect()), FULL)
         }
     };

@@ -3,8 +3,8 @@
 use super::check_unsupported;
 use crate::raster::{decode_exr, decode_picture};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
-    LayerAttributes, LineOrder, SmallVec, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds,
+    Layer, LayerAttributes, LineOrder, SmallVec, Vec2, WritableImage, f16,
 };
 use std::io::Cursor;
 
@@ -12,12 +12,18 @@ fn value(channel: usize, k: usize) -> f32 {
     channel as f32 + 0.25 * k as f32
 }
 
-fn layer(name: &str, names: &[&str], size: [usize; 2], encoding: Encoding) -> Layer<AnyChannels<FlatSamples>> {
+fn layer(
+    name: &str,
+    names: &[&str],
+    size: [usize; 2],
+    encoding: Encoding,
+) -> Layer<AnyChannels<FlatSamples>> {
     let channel = |(c, name): (usize, &&str)| {
         let values = (0..size[0] * size[1]).map(|k| value(c, k)).collect();
         AnyChannel::new(*name, FlatSamples::F32(values))
     };
-    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = names.iter().enumerate().map(channel).collect();
+    let channels: SmallVec<[AnyChannel<FlatSamples>; 4]> =
+        names.iter().enumerate().map(channel).collect();
     let attributes = LayerAttributes::named(name);
     Layer::new((size[0], size[1]), attributes, encoding, AnyChannels::sort(channels))
 }
@@ -38,15 +44,21 @@ const RGB: [&str; 3] = ["B", "G", "R"];
 #[test]
 fn parts_have_their_names_before_their_channels() {
     let encoding = Encoding::FAST_LOSSLESS;
-    let file = bytes(window(4, 3), vec![
-        layer("beauty", &RGB, [4, 3], encoding),
-        layer("normal", &["X", "Y", "Z"], [4, 3], encoding),
-    ]);
+    let file = bytes(
+        window(4, 3),
+        vec![
+            layer("beauty", &RGB, [4, 3], encoding),
+            layer("normal", &["X", "Y", "Z"], [4, 3], encoding),
+        ],
+    );
     let exr = decode_exr(&file).unwrap();
     assert!(exr.channel("beauty.R").is_some() && exr.channel("normal.X").is_some(), "{exr:?}");
     // One of the two is a photograph.
     assert_eq!(decode_picture(&file).unwrap().channels, 3);
-    let file = bytes(window(4, 3), vec![layer("a", &RGB, [4, 3], encoding), layer("b", &RGB, [4, 3], encoding)]);
+    let file = bytes(
+        window(4, 3),
+        vec![layer("a", &RGB, [4, 3], encoding), layer("b", &RGB, [4, 3], encoding)],
+    );
     check_unsupported(&file, "several layers (a, b)");
 }
 
@@ -55,7 +67,8 @@ fn tiles_and_decreasing_lines() {
     let tiles = Encoding { blocks: Blocks::Tiles(Vec2(16, 16)), ..Encoding::FAST_LOSSLESS };
     let down = Encoding { line_order: LineOrder::Decreasing, ..Encoding::SMALL_LOSSLESS };
     for encoding in [tiles, down, Encoding::UNCOMPRESSED] {
-        let exr = decode_exr(&bytes(window(40, 21), vec![layer("", &["Y"], [40, 21], encoding)])).unwrap();
+        let exr = decode_exr(&bytes(window(40, 21), vec![layer("", &["Y"], [40, 21], encoding)]))
+            .unwrap();
         let expected: Vec<f32> = (0..40 * 21).map(|k| value(0, k)).collect();
         assert_eq!(exr.channel("Y"), Some(expected.as_slice()), "{encoding:?}");
     }
@@ -65,7 +78,8 @@ fn tiles_and_decreasing_lines() {
 fn halves_and_integers_become_floats() {
     let file = |samples: FlatSamples| {
         let channels = AnyChannels::sort([AnyChannel::new("Y", samples)].into_iter().collect());
-        let layer = Layer::new((2, 1), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
+        let layer =
+            Layer::new((2, 1), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
         bytes(window(2, 1), vec![layer])
     };
     let half = file(FlatSamples::F16(vec![f16::from_f32(0.5), f16::INFINITY]));
@@ -100,9 +114,15 @@ fn alpha_of_zero_everywhere_is_none() {
         let plane = |value: f32| FlatSamples::F32(vec![value; 2]);
         let mut a = vec![alpha; 2];
         a[1] = alpha.min(0.5);
-        let channels = [("A", FlatSamples::F32(a)), ("B", plane(1.0)), ("G", plane(1.0)), ("R", plane(1.0))];
+        let channels =
+            [("A", FlatSamples::F32(a)), ("B", plane(1.0)), ("G", plane(1.0)), ("R", plane(1.0))];
         let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples));
-        let layer = Layer::new((2, 1), LayerAttributes::default(), Encoding::UNCOMPRESSED, AnyChannels::sort(channels.collect()));
+        let layer = Layer::new(
+            (2, 1),
+            LayerAttributes::default(),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort(channels.collect()),
+        );
         decode_picture(&bytes(window(2, 1), vec![layer])).unwrap().alpha
     };
     assert_eq!(file(0.0), None);
@@ -115,8 +135,10 @@ fn other_kinds_are_named() {
     let mut deep = bytes(window(4, 3), vec![layer("", &["Y"], [4, 3], Encoding::UNCOMPRESSED)]);
     deep[5] |= 0x08;
     check_unsupported(&deep, "a deep OpenEXR picture");
-    let chroma = bytes(window(4, 4), vec![layer("", &["BY", "RY", "Y"], [4, 4], Encoding::UNCOMPRESSED)]);
+    let chroma =
+        bytes(window(4, 4), vec![layer("", &["BY", "RY", "Y"], [4, 4], Encoding::UNCOMPRESSED)]);
     check_unsupported(&chroma, "luminance and chroma");
-    let vector = bytes(window(4, 4), vec![layer("", &["X", "Y", "Z"], [4, 4], Encoding::UNCOMPRESSED)]);
+    let vector =
+        bytes(window(4, 4), vec![layer("", &["X", "Y", "Z"], [4, 4], Encoding::UNCOMPRESSED)]);
     check_unsupported(&vector, "a vector or CIE XYZ");
 }

@@ -29,7 +29,8 @@ pub(crate) fn with_chunks(png: &[u8], chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8>
 fn png16() -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
-    write_png_rgb16(&path, [3, 2], PngContent::Data, |_, row| row.fill([1000, 2000, 3000])).unwrap();
+    write_png_rgb16(&path, [3, 2], PngContent::Data, |_, row| row.fill([1000, 2000, 3000]))
+        .unwrap();
     std::fs::read(&path).unwrap()
 }
 

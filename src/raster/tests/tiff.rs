@@ -19,7 +19,13 @@ pub(super) struct Page {
 }
 
 impl Page {
-    pub(super) fn new(size: [u16; 2], samples: u16, bits: u16, photometric: u16, data: Vec<u8>) -> Self {
+    pub(super) fn new(
+        size: [u16; 2],
+        samples: u16,
+        bits: u16,
+        photometric: u16,
+        data: Vec<u8>,
+    ) -> Self {
         let tags = [
             (256, vec![size[0]]),
             (257, vec![size[1]]),
@@ -64,12 +70,18 @@ impl Kind {
 
     fn value(self, value: &Value) -> (u64, u64, Vec<u8>) {
         match value {
-            Value::Short(v) => (3, v.len() as u64, v.iter().flat_map(|&v| self.number(v.into(), 2)).collect()),
-            Value::Long(v) => (4, v.len() as u64, v.iter().flat_map(|&v| self.number(v.into(), 4)).collect()),
-            Value::Bytes(v) => (7, v.len() as u64, v.clone()),
-            Value::Ratio(v) => {
-                (5, v.len() as u64, v.as_flattened().iter().flat_map(|&v| self.number(v.into(), 4)).collect())
+            Value::Short(v) => {
+                (3, v.len() as u64, v.iter().flat_map(|&v| self.number(v.into(), 2)).collect())
             }
+            Value::Long(v) => {
+                (4, v.len() as u64, v.iter().flat_map(|&v| self.number(v.into(), 4)).collect())
+            }
+            Value::Bytes(v) => (7, v.len() as u64, v.clone()),
+            Value::Ratio(v) => (
+                5,
+                v.len() as u64,
+                v.as_flattened().iter().flat_map(|&v| self.number(v.into(), 4)).collect(),
+            ),
         }
     }
 
@@ -83,10 +95,14 @@ impl Kind {
         let mut link = bytes.len();
         bytes.extend(self.number(0, offset));
         for page in pages {
-            let places: Vec<u32> = page.segments.iter().map(|segment| {
-                bytes.extend(segment);
-                (bytes.len() - segment.len()) as u32
-            }).collect();
+            let places: Vec<u32> = page
+                .segments
+                .iter()
+                .map(|segment| {
+                    bytes.extend(segment);
+                    (bytes.len() - segment.len()) as u32
+                })
+                .collect();
             let lengths = page.segments.iter().map(|segment| segment.len() as u32).collect();
             let tiled = page.tags.iter().any(|(tag, _)| *tag == 322);
             let mut tags = page.tags.clone();
@@ -96,7 +112,14 @@ impl Kind {
             let mut entries = self.number(tags.len() as u64, head);
             for (tag, value) in &tags {
                 let (kind, count, mut data) = self.value(value);
-                entries.extend([self.number((*tag).into(), 2), self.number(kind, 2), self.number(count, field)].concat());
+                entries.extend(
+                    [
+                        self.number((*tag).into(), 2),
+                        self.number(kind, 2),
+                        self.number(count, field),
+                    ]
+                    .concat(),
+                );
                 if data.len() <= offset {
                     data.resize(offset, 0);
                     entries.extend(data);
@@ -117,12 +140,17 @@ impl Kind {
     /// Samples packed row by row, each row from a whole byte on.
     pub(super) fn pack(self, samples: &[u32], row: usize, bits: u32) -> Vec<u8> {
         if matches!(bits, 16 | 24 | 32) {
-            return samples.iter().flat_map(|&s| self.number(s.into(), bits as usize / 8)).collect();
+            return samples
+                .iter()
+                .flat_map(|&s| self.number(s.into(), bits as usize / 8))
+                .collect();
         }
         let mut bytes = Vec::new();
         for row in samples.chunks(row) {
-            let all: Vec<bool> =
-                row.iter().flat_map(|&s| (0..bits).rev().map(move |bit| s >> bit & 1 == 1)).collect();
+            let all: Vec<bool> = row
+                .iter()
+                .flat_map(|&s| (0..bits).rev().map(move |bit| s >> bit & 1 == 1))
+                .collect();
             bytes.extend(all.chunks(8).map(|byte| {
                 byte.iter().enumerate().fold(0, |sum, (k, &bit)| sum | u8::from(bit) << (7 - k))
             }));
@@ -195,9 +223,12 @@ fn strips_tiles_and_planes() {
     let mut strips = Page::new([7, 5], 3, 16, 2, vec![]).short(278, 2);
     strips.segments = vec![rows(0, 2), rows(2, 4), rows(4, 5)];
     assert_eq!(numbers(&decoded(&PLAIN.file(&[strips])).values), expected);
-    let at = |x: usize, y: usize, c: usize| if x < 7 && y < 5 { samples[(y * 7 + x) * 3 + c] } else { 9 };
+    let at = |x: usize, y: usize, c: usize| {
+        if x < 7 && y < 5 { samples[(y * 7 + x) * 3 + c] } else { 9 }
+    };
     let tile = |left: usize, top: usize| {
-        let all = (0..16).flat_map(|y| (0..16).flat_map(move |x| [0, 1, 2].map(|c| at(left + x, top + y, c))));
+        let all = (0..16)
+            .flat_map(|y| (0..16).flat_map(move |x| [0, 1, 2].map(|c| at(left + x, top + y, c))));
         PLAIN.pack(&all.collect::<Vec<_>>(), 48, 16)
     };
     let tiles = Page::new([7, 5], 3, 16, 2, tile(0, 0)).short(322, 16).short(323, 16);

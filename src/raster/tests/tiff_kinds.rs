@@ -22,10 +22,14 @@ fn packed_bits(data: &[u8]) -> Vec<u8> {
 
 fn compressed(compression: u16, data: &[u8]) -> Vec<u8> {
     match compression {
-        5 => weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8).encode(data).unwrap(),
+        5 => weezl::encode::Encoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8)
+            .encode(data)
+            .unwrap(),
         8 | 32_946 => deflated(data),
         32_773 => packed_bits(data),
-        50_000 => ruzstd::encoding::compress_to_vec(data, ruzstd::encoding::CompressionLevel::Fastest),
+        50_000 => {
+            ruzstd::encoding::compress_to_vec(data, ruzstd::encoding::CompressionLevel::Fastest)
+        }
         _ => data.to_vec(),
     }
 }
@@ -41,7 +45,11 @@ fn every_lossless_compression_with_and_without_differences() {
                 let stored: Vec<u32> = match predictor {
                     2 => samples
                         .chunks(36)
-                        .flat_map(|row| (0..36).map(|i| if i < 4 { row[i] } else { row[i].wrapping_sub(row[i - 4]) & full }))
+                        .flat_map(|row| {
+                            (0..36).map(|i| {
+                                if i < 4 { row[i] } else { row[i].wrapping_sub(row[i - 4]) & full }
+                            })
+                        })
                         .collect(),
                     _ => samples.clone(),
                 };
@@ -74,10 +82,13 @@ fn the_floating_point_predictor() {
         let row = |values: &[f32]| {
             let bytes: Vec<[u8; 4]> = values.iter().map(|v| v.to_bits().to_be_bytes()).collect();
             let planes: Vec<u8> = (0..4).flat_map(|k| bytes.iter().map(move |b| b[k])).collect();
-            (0..planes.len()).map(|i| if i < 3 { planes[i] } else { planes[i].wrapping_sub(planes[i - 3]) }).collect::<Vec<u8>>()
+            (0..planes.len())
+                .map(|i| if i < 3 { planes[i] } else { planes[i].wrapping_sub(planes[i - 3]) })
+                .collect::<Vec<u8>>()
         };
         let data: Vec<u8> = values.chunks(12).flat_map(row).collect();
-        let page = Page::new([4, 2], 3, 32, 2, deflated(&data)).short(259, 8).short(317, 3).short(339, 3);
+        let page =
+            Page::new([4, 2], 3, 32, 2, deflated(&data)).short(259, 8).short(317, 3).short(339, 3);
         assert_eq!(decoded(&kind.file(&[page])).values, Values::F32(values.clone()));
     }
 }
@@ -104,7 +115,10 @@ fn palettes_are_expanded() {
     for step in [1, 257] {
         let page = Page::new([2, 1], 1, 4, 3, vec![0x20]).with(320, table(step));
         let picture = decoded(&PLAIN.file(&[page]));
-        assert_eq!((picture.channels, picture.values), (3, Values::U8(vec![10, 200, 255, 0, 0, 0])));
+        assert_eq!(
+            (picture.channels, picture.values),
+            (3, Values::U8(vec![10, 200, 255, 0, 0, 0]))
+        );
     }
     let error = decode_picture(&PLAIN.file(&[Page::new([2, 1], 1, 4, 3, vec![0x20])])).unwrap_err();
     assert!(matches!(error, PictureError::Damaged { .. }), "{error}");
@@ -113,7 +127,8 @@ fn palettes_are_expanded() {
 #[test]
 fn alpha_and_other_channels() {
     let rgba = |kind: u16| Page::new([1, 1], 4, 8, 2, vec![10, 20, 30, 128]).short(338, kind);
-    let alpha = |kind: u16| decoded(&PLAIN.file(&[rgba(kind)])).alpha.map(|alpha| alpha.premultiplied);
+    let alpha =
+        |kind: u16| decoded(&PLAIN.file(&[rgba(kind)])).alpha.map(|alpha| alpha.premultiplied);
     assert_eq!([0, 1, 2].map(alpha), [None, Some(true), Some(false)]);
     let grey = Page::new([1, 1], 2, 8, 1, vec![7, 0]).short(338, 2);
     let grey = decoded(&PLAIN.file(&[grey]));
@@ -137,8 +152,16 @@ fn what_is_not_read_is_named() {
     check(Page::new([2, 1], 3, 16, 32_845, vec![0; 12]), "a LogLuv TIFF");
     check(grey(1).short(262, 4), "transparency mask");
     for (compression, name) in [
-        (3, "fax"), (4, "fax"), (6, "JPEG"), (34_676, "SGI LogLuv"), (34_712, "JPEG 2000"), (34_887, "LERC"),
-        (34_925, "LZMA"), (50_001, "WebP"), (50_002, "JPEG XL"), (33_333, "compression 33333"),
+        (3, "fax"),
+        (4, "fax"),
+        (6, "JPEG"),
+        (34_676, "SGI LogLuv"),
+        (34_712, "JPEG 2000"),
+        (34_887, "LERC"),
+        (34_925, "LZMA"),
+        (50_001, "WebP"),
+        (50_002, "JPEG XL"),
+        (33_333, "compression 33333"),
     ] {
         check(grey(8).short(259, compression), name);
     }
@@ -153,7 +176,10 @@ fn damage_is_called_damage() {
     let whole = PLAIN.file(std::slice::from_ref(&page));
     let check = |bytes: &[u8], expected: &str| {
         let error = decode_picture(bytes).unwrap_err().to_string();
-        assert!(error.contains(expected) && error.ends_with("copy it again from where it came"), "{error}");
+        assert!(
+            error.contains(expected) && error.ends_with("copy it again from where it came"),
+            "{error}"
+        );
     };
     check(&whole[..6], "damaged");
     let mut short = page.clone();
@@ -184,7 +210,9 @@ fn encodings_of_a_tiff() {
     let table = said(page().with(301, Value::Short(linear)));
     assert_eq!(table.curve, SaidCurve::Known(Curve::Linear));
     let corners = [64, 33, 30, 60, 15, 6].map(|v| [v, 100]).to_vec();
-    let primaries = page().with(318, Value::Ratio(vec![[3127, 10_000], [3290, 10_000]])).with(319, Value::Ratio(corners));
+    let primaries = page()
+        .with(318, Value::Ratio(vec![[3127, 10_000], [3290, 10_000]]))
+        .with(319, Value::Ratio(corners));
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     assert_eq!(said(primaries).linear_srgb_from_rgb, Some(identity));
     let grey = Page::new([1, 1], 1, 8, 1, vec![0]).short(291, 100);

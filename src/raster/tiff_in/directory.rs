@@ -160,7 +160,9 @@ impl<'a> Directory<'a> {
     /// Values of a tag lie beyond the file's end.
     pub(super) fn check_whole(&self) -> Result<(), PictureError> {
         match self.cut {
-            Some(tag) => Err(PictureError::damaged(format!("the values of its tag {tag} lie beyond its end"))),
+            Some(tag) => Err(PictureError::damaged(format!(
+                "the values of its tag {tag} lie beyond its end"
+            ))),
             None => Ok(()),
         }
     }

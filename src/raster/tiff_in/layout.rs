@@ -53,7 +53,8 @@ impl Layout {
         let [width, height] = page.size().ok_or_else(|| PictureError::damaged("it has no size"))?;
         let samples = page.integer(tag::SAMPLES_PER_PIXEL).unwrap_or(1);
         let bits = equal(page, tag::BITS_PER_SAMPLE, 1, "channels of different depth")?;
-        let format = format(equal(page, tag::SAMPLE_FORMAT, 1, "channels of different format")?, bits)?;
+        let format =
+            format(equal(page, tag::SAMPLE_FORMAT, 1, "channels of different format")?, bits)?;
         let colors = colors(page, samples, format)?;
         let count = colors.count() as u64;
         if samples < count || samples > 64 {

@@ -35,7 +35,10 @@ pub(super) fn decode(bytes: &[u8], first: bool, page: &Directory) -> Result<Pict
         return Err(refused(7));
     };
     if values.len() != needed {
-        return Err(PictureError::damaged(format!("it holds {} of {needed} samples", values.len())));
+        return Err(PictureError::damaged(format!(
+            "it holds {} of {needed} samples",
+            values.len()
+        )));
     }
     let said = super::said::said(page, &layout);
     let size = [layout.width, layout.height];

@@ -9,8 +9,8 @@ mod directory;
 mod layout;
 mod library;
 mod page;
-mod samples;
 mod said;
+mod samples;
 mod segments;
 
 use self::directory::{Directory, File, tag};
@@ -88,7 +88,8 @@ fn check_size(layout: &Layout, bytes: usize) -> Result<(), PictureError> {
     match layout.compression {
         50_000 => limits::check(size[0], size[1], layout.samples, usize::MAX),
         _ if layout.bits < 8 => {
-            let row = size[0].saturating_mul(layout.samples as u64 * u64::from(layout.bits)).div_ceil(8);
+            let row =
+                size[0].saturating_mul(layout.samples as u64 * u64::from(layout.bits)).div_ceil(8);
             limits::check_packed(size, row, bytes)
         }
         _ => limits::check(size[0], size[1], layout.samples, bytes),
@@ -109,7 +110,8 @@ fn alpha<T: Stored>(layout: &Layout, samples: &[T]) -> Option<Alpha> {
         Format::Float => f32::from_bits(value),
         Format::Unsigned => (f64::from(value) / full_scale(layout)) as f32,
     };
-    let values = samples.iter().skip(at).step_by(layout.samples).map(|value| opacity(value.number()));
+    let values =
+        samples.iter().skip(at).step_by(layout.samples).map(|value| opacity(value.number()));
     Some(Alpha { values: values.collect(), premultiplied })
 }
 
@@ -142,5 +144,7 @@ fn expand<T: Stored>(
     let step = if table.iter().all(|&value| value < 256) { 1 } else { 257 };
     let byte = |value: u64| T::from_number(((value + step / 2) / step).min(255) as u32);
     let indices = samples.iter().step_by(layout.samples);
-    Ok(indices.flat_map(|k| [0, 1, 2].map(|c| byte(table[c * colors + k.number() as usize]))).collect())
+    Ok(indices
+        .flat_map(|k| [0, 1, 2].map(|c| byte(table[c * colors + k.number() as usize])))
+        .collect())
 }

@@ -52,7 +52,8 @@ pub(super) fn read<T: Stored>(
         for (y, packed) in (top..).zip(bytes.chunks_exact(row_bytes)) {
             unpack_row(file, layout, packed, &mut swapped, &mut row);
             let start = (y * layout.width + left) * layout.samples + plane;
-            let pixels = samples[start..].chunks_mut(layout.samples).zip(row.chunks_exact(together));
+            let pixels =
+                samples[start..].chunks_mut(layout.samples).zip(row.chunks_exact(together));
             for (pixel, stored) in pixels.take(width) {
                 let stored = stored.iter().map(|&number| T::from_number(number));
                 pixel.iter_mut().zip(stored).for_each(|(sample, stored)| *sample = stored);

@@ -18,7 +18,11 @@ pub(super) struct Segments<'a> {
 impl<'a> Segments<'a> {
     /// # Errors
     /// Tags that are absent or contradict each other, or data beyond the file's end.
-    pub(super) fn parse(file: File<'a>, page: &Directory, layout: &Layout) -> Result<Self, PictureError> {
+    pub(super) fn parse(
+        file: File<'a>,
+        page: &Directory,
+        layout: &Layout,
+    ) -> Result<Self, PictureError> {
         let tiled = page.has(tag::TILE_OFFSETS);
         let (offsets, counts, name) = if tiled {
             (tag::TILE_OFFSETS, tag::TILE_BYTE_COUNTS, "tile")
@@ -34,14 +38,22 @@ impl<'a> Segments<'a> {
             [layout.width, side(tag::ROWS_PER_STRIP, layout.height).min(layout.height)]
         };
         // A tile may be larger than the picture, but not absurdly so.
-        if size.contains(&0) || size[0] > layout.width + 65_536 || size[1] > layout.height + 65_536 {
-            return Err(PictureError::damaged(format!("its {name}s measure {} x {}", size[0], size[1])));
+        if size.contains(&0) || size[0] > layout.width + 65_536 || size[1] > layout.height + 65_536
+        {
+            return Err(PictureError::damaged(format!(
+                "its {name}s measure {} x {}",
+                size[0], size[1]
+            )));
         }
         let numbers = |tag| {
-            page.integers(tag).ok_or_else(|| PictureError::damaged("it does not say where its samples are"))
+            page.integers(tag)
+                .ok_or_else(|| PictureError::damaged("it does not say where its samples are"))
         };
-        let places: Vec<[u64; 2]> =
-            numbers(offsets)?.into_iter().zip(numbers(counts)?).map(|(at, length)| [at, length]).collect();
+        let places: Vec<[u64; 2]> = numbers(offsets)?
+            .into_iter()
+            .zip(numbers(counts)?)
+            .map(|(at, length)| [at, length])
+            .collect();
         let have = file.bytes.len() as u64;
         for (i, [offset, length]) in places.iter().enumerate() {
             let needed = offset.saturating_add(*length);
@@ -62,15 +74,23 @@ impl<'a> Segments<'a> {
     ///
     /// # Errors
     /// Fewer than that, or a compression that is not read.
-    pub(super) fn bytes(&self, i: usize, layout: &Layout, needed: usize) -> Result<Cow<'a, [u8]>, PictureError> {
+    pub(super) fn bytes(
+        &self,
+        i: usize,
+        layout: &Layout,
+        needed: usize,
+    ) -> Result<Cow<'a, [u8]>, PictureError> {
         let [offset, length] = self.places[i].map(|number| number as usize);
         let packed = &self.file.bytes[offset..offset + length];
         let reversed = || Cow::Owned(packed.iter().map(|byte| byte.reverse_bits()).collect());
-        let packed: Cow<[u8]> = if layout.lowest_bit_first { reversed() } else { Cow::Borrowed(packed) };
+        let packed: Cow<[u8]> =
+            if layout.lowest_bit_first { reversed() } else { Cow::Borrowed(packed) };
         let mut bytes = match layout.compression {
             1 => packed,
             5 => Cow::Owned(unpack_lzw(&packed, needed)?),
-            8 | 32_946 => Cow::Owned(read_exactly(flate2::read::ZlibDecoder::new(&*packed), needed)?),
+            8 | 32_946 => {
+                Cow::Owned(read_exactly(flate2::read::ZlibDecoder::new(&*packed), needed)?)
+            }
             32_773 => Cow::Owned(unpack_bits(&packed, needed)),
             50_000 => Cow::Owned(unpack_zstd(&packed, needed)?),
             other => return Err(refused(other)),
@@ -104,7 +124,10 @@ pub(super) fn refused(compression: u64) -> PictureError {
             return PictureError::unsupported(format!("a TIFF with compression {other}"), SAVE_AS);
         }
     };
-    PictureError::unsupported(format!("a TIFF with {name}"), "save it uncompressed, or with LZW or ZIP")
+    PictureError::unsupported(
+        format!("a TIFF with {name}"),
+        "save it uncompressed, or with LZW or ZIP",
+    )
 }
 
 fn does_not_unpack() -> PictureError {
@@ -121,9 +144,7 @@ fn read_exactly(reader: impl Read, length: usize) -> Result<Vec<u8>, PictureErro
 /// TIFF 6.0, section 13. Some old files have the other bit order of GIF; they begin with a clear code of theirs.
 fn unpack_lzw(packed: &[u8], length: usize) -> Result<Vec<u8>, PictureError> {
     let mut decoder = match packed {
-        [0, second, ..] if second & 1 == 1 => {
-            weezl::decode::Decoder::new(weezl::BitOrder::Lsb, 8)
-        }
+        [0, second, ..] if second & 1 == 1 => weezl::decode::Decoder::new(weezl::BitOrder::Lsb, 8),
         _ => weezl::decode::Decoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8),
     };
     let mut bytes = Vec::new();
@@ -167,7 +188,6 @@ fn unpack_bits(packed: &[u8], length: usize) -> Vec<u8> {
 }
 
 fn unpack_zstd(packed: &[u8], length: usize) -> Result<Vec<u8>, PictureError> {
-    let decoder =
-        ruzstd::decoding::StreamingDecoder::new(packed).map_err(|_| does_not_unpack())?;
+    let decoder = ruzstd::decoding::StreamingDecoder::new(packed).map_err(|_| does_not_unpack())?;
     read_exactly(decoder, length)
 }

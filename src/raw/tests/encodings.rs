@@ -45,7 +45,8 @@ fn the_files_word_is_used_where_nothing_is_declared() {
     let silent = decode(&png16(color, |_| ()), &NOTHING).unwrap();
     assert_eq!((first(&silent), silent.metadata.numbers.encoding), (color, None));
     assert_eq!(silent.metadata.numbers.linear_srgb_from_rgb, None);
-    let gamma = |info: &mut png::Info| info.source_gamma = Some(png::ScaledFloat::from_scaled(50_000));
+    let gamma =
+        |info: &mut png::Info| info.source_gamma = Some(png::ScaledFloat::from_scaled(50_000));
     let squared = decode(&png16([32_768, 0, 65_535], gamma), &NOTHING).unwrap();
     assert_eq!(first(&squared), [16_384, 0, 65_535]);
     // 8 bits need not be declared where the file says.
@@ -63,8 +64,10 @@ fn what_is_declared_goes_first_and_the_contradiction_is_told() {
     assert_eq!(told, "its sRGB chunk says sRGB, declared is linear");
     let same = decode(&png16(color, tagged), &SRGB).unwrap();
     assert_eq!(same.metadata.numbers.contradiction, None);
-    let linear = |info: &mut png::Info| info.source_gamma = Some(png::ScaledFloat::from_scaled(100_000));
-    let told = decode(&png16(color, linear), &SRGB).unwrap().metadata.numbers.contradiction.unwrap();
+    let linear =
+        |info: &mut png::Info| info.source_gamma = Some(png::ScaledFloat::from_scaled(100_000));
+    let told =
+        decode(&png16(color, linear), &SRGB).unwrap().metadata.numbers.contradiction.unwrap();
     assert_eq!(told, "its gAMA chunk says linear, declared is sRGB");
 }
 
@@ -76,7 +79,10 @@ fn a_curve_that_cannot_be_applied_asks_for_a_declaration() {
     let bytes = png16([9; 3], lab);
     let error = decode(&bytes, &NOTHING).unwrap_err();
     assert!(matches!(error, DecodeError::EncodingUnreadable { .. }), "{error}");
-    assert!(error.to_string().contains("its ICC profile") && error.to_string().contains("; declare"), "{error}");
+    assert!(
+        error.to_string().contains("its ICC profile") && error.to_string().contains("; declare"),
+        "{error}"
+    );
     assert_eq!(first(&decode(&bytes, &LINEAR).unwrap()), [9; 3]);
 }
 

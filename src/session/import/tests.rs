@@ -316,9 +316,11 @@ fn twelve_bits_in_sixteen_clip_at_4095() {
 fn a_mask_that_is_transparent_outside() {
     let set = Set::new("lights.txt", DIRECTIONS, &["a.png", "b.png", "c.png"]);
     let inside = |x: u32| x >= 2;
-    image::ImageBuffer::from_fn(4, 3, |x, _| image::Rgba([255_u8, 255, 255, if inside(x) { 255 } else { 0 }]))
-        .save(set.path("mask.png"))
-        .unwrap();
+    image::ImageBuffer::from_fn(4, 3, |x, _| {
+        image::Rgba([255_u8, 255, 255, if inside(x) { 255 } else { 0 }])
+    })
+    .save(set.path("mask.png"))
+    .unwrap();
     let mut options = set.options("lights.txt", &["a.png", "b.png", "c.png"]);
     options.mask = Some(set.path("mask.png"));
     let (session, _) = set.import(&options).unwrap();
