@@ -386,7 +386,7 @@ fn comparisons() {
     );
     check(
         "compare maps/normal.exr maps/normal.exr --mask black.png",
-        &["no pixel has a value in both"],
+        &["black.png", "black everywhere"],
     );
     let equal = home.run("compare maps/normal.exr maps/normal.exr --json").json();
     assert_eq!(

@@ -251,6 +251,7 @@ impl Window {
         }
         let (columns, left) = self.overlap(0, display[0]);
         let (rows, top) = self.overlap(1, display[1]);
+        let rows = if columns.is_empty() { 0..0 } else { rows };
         let mut placed = vec![0.0; display[0] * display[1]];
         for (row, from) in rows.zip(top..) {
             let source = from * self.size[0] + left;

@@ -64,15 +64,19 @@ pub(crate) fn groups(names: &[&str]) -> Vec<Group> {
     layers.dedup();
     let group = |layer: &String| {
         let place = |wanted: &str| names.iter().position(|(l, last)| l == layer && last == wanted);
-        ROLES.iter().find_map(|(wanted, role)| {
-            let found: Vec<usize> = wanted.iter().map_while(|name| place(name)).collect();
-            let channels = match found[..] {
-                [a, b, c] => [a, b, c],
-                [only] if wanted.len() == 1 => [only; 3],
-                _ => return None,
-            };
-            Some(Group { layer: layer.clone(), role: *role, channels, alpha: place("A") })
-        })
+        // One component of a vector is no picture.
+        let vector = place("X").is_some() || place("U").is_some();
+        ROLES.iter().filter(|(_, role)| *role != Role::Grey || !vector).find_map(
+            |(wanted, role)| {
+                let found: Vec<usize> = wanted.iter().map_while(|name| place(name)).collect();
+                let channels = match found[..] {
+                    [a, b, c] => [a, b, c],
+                    [only] if wanted.len() == 1 => [only; 3],
+                    _ => return None,
+                };
+                Some(Group { layer: layer.clone(), role: *role, channels, alpha: place("A") })
+            },
+        )
     };
     layers.into_iter().filter_map(group).collect()
 }
@@ -189,6 +193,8 @@ mod tests {
         check(&["BY", "RY", "Y"], Any, Err("luminance and chroma"));
         check(&["BY", "RY", "Y"], Colors, Err("luminance and chroma"));
         check(&["U", "V.Depth.Z"], Colors, Err("channels U, V.Depth.Z"));
+        check(&["U", "V"], Colors, Err("channels U, V"));
+        check(&["X", "Y"], Any, Err("channels X, Y"));
         check(&["b", "g", "r"], Colors, Ok(("", Role::Rgb)));
     }
 

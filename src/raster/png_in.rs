@@ -75,6 +75,7 @@ fn said(info: &Info) -> Said {
         linear_srgb_from(corners, numbers(chunk.white))
     });
     let said = match info.gama_chunk.map(ScaledFloat::into_scaled) {
+        None if primaries.is_none() => return Said::default(),
         None => Said { by: "its cHRM chunk".to_owned(), ..Said::default() },
         Some(0) => Said::unreadable("it is 0", "its gAMA chunk"),
         Some(100_000) => Said::known(Curve::Linear, "its gAMA chunk"),

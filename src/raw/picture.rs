@@ -123,7 +123,8 @@ fn numbers(picture: &Picture, applied: &Curve, hint: &Hint) -> Numbers {
         _ => None,
     };
     // Pictures in sRGB's curve come in sRGB's primaries, unless they say otherwise.
-    let primaries = linear_srgb_from_rgb.or((*applied == Curve::Srgb).then_some(IDENTITY));
+    let stated = linear_srgb_from_rgb.filter(|_| picture.channels == 3);
+    let primaries = stated.or((*applied == Curve::Srgb).then_some(IDENTITY));
     let integers = !matches!(picture.values, Values::F32(_));
     Numbers {
         may_clip_below: integers,
@@ -134,7 +135,7 @@ fn numbers(picture: &Picture, applied: &Curve, hint: &Hint) -> Numbers {
             _ => None,
         },
         contradiction,
-        linear_srgb_from_rgb: primaries.filter(|_| picture.channels == 3),
+        linear_srgb_from_rgb: primaries,
     }
 }
 

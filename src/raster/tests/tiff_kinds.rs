@@ -130,6 +130,10 @@ fn alpha_and_other_channels() {
     let alpha =
         |kind: u16| decoded(&PLAIN.file(&[rgba(kind)])).alpha.map(|alpha| alpha.premultiplied);
     assert_eq!([0, 1, 2].map(alpha), [None, Some(true), Some(false)]);
+    let unnamed =
+        |alpha: u8| decoded(&PLAIN.file(&[Page::new([1, 1], 4, 8, 2, vec![9, 9, 9, alpha])]));
+    assert_eq!(unnamed(51).alpha.unwrap().values, vec![0.2]);
+    assert_eq!(unnamed(0).alpha, None);
     let grey = Page::new([1, 1], 2, 8, 1, vec![7, 0]).short(338, 2);
     let grey = decoded(&PLAIN.file(&[grey]));
     assert_eq!((grey.values, grey.alpha.unwrap().values), (Values::U8(vec![7]), vec![0.0]));

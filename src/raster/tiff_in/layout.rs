@@ -37,6 +37,8 @@ pub(super) struct Layout {
     pub(super) colors: Colors,
     /// Place of the alpha among the samples, and whether the colours are multiplied by it.
     pub(super) alpha: Option<(usize, bool)>,
+    /// Whether a tag says that it is alpha.
+    pub(super) alpha_named: bool,
     /// Whether each sample has a plane of its own.
     pub(super) planar: bool,
     pub(super) compression: u64,
@@ -65,8 +67,13 @@ impl Layout {
             let what = format!("a TIFF of {samples} channels that are no colours");
             return Err(PictureError::unsupported(what, SAVE_AS));
         }
-        let alpha = extra.iter().position(|kind| matches!(kind, 1 | 2));
-        let alpha = alpha.map(|at| (at + count as usize, extra[at] == 1));
+        let named = extra.iter().position(|kind| matches!(kind, 1 | 2));
+        let alpha = match named {
+            Some(at) => Some((at + count as usize, extra[at] == 1)),
+            // Programs that write one more channel without naming it mean alpha.
+            None if extra.is_empty() && samples == count + 1 => Some((count as usize, false)),
+            None => None,
+        };
         let number = |tag, absent| page.integer(tag).unwrap_or(absent);
         Ok(Self {
             width: usize::try_from(width).unwrap_or(usize::MAX),
@@ -76,6 +83,7 @@ impl Layout {
             format,
             colors,
             alpha: alpha.filter(|(at, _)| (*at as u64) < samples),
+            alpha_named: named.is_some(),
             planar: number(tag::PLANAR_CONFIGURATION, 1) == 2 && samples > 1,
             compression: number(tag::COMPRESSION, 1),
             predictor: number(tag::PREDICTOR, 1),

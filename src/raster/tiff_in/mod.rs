@@ -112,7 +112,10 @@ fn alpha<T: Stored>(layout: &Layout, samples: &[T]) -> Option<Alpha> {
     };
     let values =
         samples.iter().skip(at).step_by(layout.samples).map(|value| opacity(value.number()));
-    Some(Alpha { values: values.collect(), premultiplied })
+    let values: Vec<f32> = values.collect();
+    // A channel that is not named and empty is a filler.
+    let counts = layout.alpha_named || values.iter().any(|&alpha| alpha > 0.0);
+    counts.then_some(Alpha { values, premultiplied })
 }
 
 /// Leaves the colours of each pixel, black as zero.

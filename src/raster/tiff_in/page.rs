@@ -69,7 +69,15 @@ fn not_a_thumbnail(page: &Directory, file_bytes: u64) -> Result<(), PictureError
     let pixels = width.saturating_mul(height);
     let picture = pixels.saturating_mul(samples).saturating_mul(bits) / 8;
     // Profiles and an editor's layers say nothing of sensor data.
-    let beside = [tag::ICC_PROFILE, tag::XMP, tag::IPTC, tag::PHOTOSHOP, tag::PHOTOSHOP_LAYERS];
+    let beside = [
+        tag::TRANSFER_FUNCTION,
+        tag::COLOR_MAP,
+        tag::ICC_PROFILE,
+        tag::XMP,
+        tag::IPTC,
+        tag::PHOTOSHOP,
+        tag::PHOTOSHOP_LAYERS,
+    ];
     let beside: usize = beside.iter().filter_map(|&tag| page.bytes(tag)).map(<[u8]>::len).sum();
     let rest = file_bytes.saturating_sub(beside as u64);
     if rest > SMALL_FILE && picture < rest / SMALLEST_SHARE {

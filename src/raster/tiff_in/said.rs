@@ -17,6 +17,7 @@ pub(super) fn said(page: &Directory, layout: &Layout) -> Said {
     let primaries = (layout.colors == Colors::Rgb).then(|| primaries(page)).flatten();
     match page.integers(tag::TRANSFER_FUNCTION) {
         Some(table) => transfer_function(&table, layout).with_primaries(primaries),
+        None if primaries.is_none() => Said::default(),
         None => Said { by: "its PrimaryChromaticities tag".to_owned(), ..Said::default() }
             .with_primaries(primaries),
     }
