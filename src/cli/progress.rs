@@ -1,6 +1,7 @@
 //! A bar on standard error, and only on a terminal.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::Write;
 
 /// Steps of the bar: fine enough that it does not jump.
 const STEPS: u64 = 1000;
@@ -31,6 +32,16 @@ impl Progress {
     /// A line that stays, over the bar; on a terminal only.
     pub(super) fn say(&self, line: &str) {
         self.0.println(line);
+    }
+
+    /// A line that stays, on a terminal or not: what the user has to do for the work to go on.
+    pub(super) fn note(&self, line: &str) {
+        if self.0.is_hidden() {
+            // Nothing reads standard error any more: the work goes on.
+            let _ = writeln!(std::io::stderr().lock(), "{line}");
+        } else {
+            self.0.println(line);
+        }
     }
 }
 

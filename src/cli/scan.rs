@@ -5,8 +5,8 @@ use super::progress::Progress;
 use super::target;
 use crate::device::camera::Settings;
 use crate::device::scan::{
-    About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Subject, Summary,
-    open, preview, scan,
+    About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Step, Subject,
+    Summary, open, preview, scan, survey,
 };
 use crate::instrument::Rig;
 use crate::session::{FrameEntry, Session};
@@ -52,7 +52,7 @@ pub(super) struct Args {
     /// Go on where an earlier scan ended
     #[arg(long)]
     resume: bool,
-    /// Print what would be photographed, and touch nothing
+    /// Print what would be photographed and, with --out, what is there already; write nothing
     #[arg(long)]
     dry_run: bool,
     /// Take one test shot, tell exposure and focus, and write nothing
@@ -87,7 +87,7 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let subject = args.target.subject(args.light.unwrap_or(0), there.is_empty())?;
     let plan = Plan::of(&rig, &subject, &args.bracket, &there).map_err(failure)?;
     match &args.out {
-        _ if args.dry_run => Ok(describe_plan(&plan, args)),
+        _ if args.dry_run => describe_plan(&plan, args, &subject),
         Some(out) => photograph(args, &rig, subject, out.clone()),
         None => Err(Failure::call("--out is missing; name a folder, as in --out linen-4021")),
     }
@@ -121,7 +121,7 @@ fn photograph(
         folder,
         subject,
         about: About { name: args.name.clone(), thickness_mm: args.thickness_mm },
-        begin: if args.resume || args.target.adds() { Begin::Resume } else { Begin::Anew },
+        begin: begin(args),
         exposure_s: args.exposure_s,
         iso: args.iso,
         bracket: args.bracket.clone(),
@@ -145,10 +145,11 @@ fn show(progress: &Progress, event: &Event) {
             let what = format!("{frame}{}", left.unwrap_or_default());
             progress.set(*done as f64 / (*total).max(1) as f64, &what);
         }
+        Event::Waiting { frame, what, .. } => progress.note(&format!("{frame}: {what}")),
         Event::Kept { .. } => {}
         Event::Again { frame, why } => progress.say(&format!("{frame}: {why}")),
-        Event::BoardLost => progress.say("the light board is gone; plug it in again"),
-        Event::Paused => progress.say("paused"),
+        Event::BoardLost => progress.note("the light board is gone; plug it in again"),
+        Event::Paused => progress.note("paused"),
     }
 }
 
@@ -194,21 +195,27 @@ fn of_summary(summary: &Summary) -> Value {
     })
 }
 
-fn describe_plan(plan: &Plan, args: &Args) -> Output {
+/// What would be photographed; with --out, what is there already.
+fn describe_plan(plan: &Plan, args: &Args, subject: &Subject) -> Result<Output, Failure> {
+    let about = About { name: args.name.clone(), thickness_mm: args.thickness_mm };
+    let (there, warnings) = match &args.out {
+        Some(out) => survey(out, (&about, subject), begin(args), plan).map_err(failure)?,
+        None => (vec![false; plan.steps.len()], Vec::new()),
+    };
     let exposure = |factor: f64| args.exposure_s.map(|s| s * factor);
-    let line = |(k, step): (usize, &crate::device::scan::Step)| {
+    let line = |(k, (step, there)): (usize, (&Step, &bool))| {
         let output = step.output.map_or("all off".to_owned(), |output| format!("output {output}"));
-        let exposure = exposure(step.factor).map_or_else(
-            || format!("{} x the exposure to be found", step.factor),
-            |s| format!("{s} s"),
-        );
+        let exposure = match (there, exposure(step.factor)) {
+            (true, _) => "there already".to_owned(),
+            (false, Some(s)) => format!("{s} s"),
+            (false, None) => format!("{} x the exposure to be found", step.factor),
+        };
         format!("{:3}  {:24} {output:10} {exposure}", k + 1, step.stem)
     };
-    let lines: Vec<String> = plan.steps.iter().enumerate().map(line).collect();
-    let json: Vec<Value> = plan
-        .steps
-        .iter()
-        .map(|step| {
+    let steps = || plan.steps.iter().zip(&there);
+    let lines: Vec<String> = steps().enumerate().map(line).collect();
+    let json: Vec<Value> = steps()
+        .map(|(step, there)| {
             json!({
                 "file": step.stem,
                 "light": step.light,
@@ -216,10 +223,16 @@ fn describe_plan(plan: &Plan, args: &Args) -> Output {
                 "exposure_s": exposure(step.factor),
                 "factor": step.factor,
                 "drift_check": step.drift_check,
+                "there": there,
             })
         })
         .collect();
-    Output { text: lines.join("\n"), json: json!({ "frames": json }), ..Output::default() }
+    let json = json!({ "frames": json, "warnings": warnings });
+    Ok(Output { text: lines.join("\n"), json, warnings, status: 0 })
+}
+
+fn begin(args: &Args) -> Begin {
+    if args.resume || args.target.adds() { Begin::Resume } else { Begin::Anew }
 }
 
 fn look(args: &Args, rig: &Rig, plan: &Plan) -> Result<Output, Failure> {

@@ -2,4 +2,5 @@
 
 pub mod board;
 pub mod camera;
+mod look;
 pub mod scan;

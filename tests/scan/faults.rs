@@ -337,6 +337,9 @@ fn watched(laboratory: &Laboratory, names: &'static [&'static str]) -> Result<Su
     let (seen, target) = (board.clone(), folder.clone());
     let jpeg = laboratory.path("rig/x.jpg");
     image::RgbImage::new(16, 16).save(&jpeg).unwrap();
+    let cr3 = laboratory.path("rig/x.cr3");
+    std::fs::write(&cr3, [&b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom"[..], &[7; 4096]].concat())
+        .unwrap();
     // It ends with the test's process.
     std::thread::spawn(move || {
         let (mut number, mut before) = (0, 0);
@@ -346,9 +349,12 @@ fn watched(laboratory: &Laboratory, names: &'static [&'static str]) -> Result<Su
                 number += 1;
                 std::thread::sleep(Duration::from_millis(60));
                 for name in names {
-                    let frame =
-                        if name.ends_with("dng") { &frames[&(pins & 0xFFFF)] } else { &jpeg };
-                    let _ = std::fs::copy(frame, target.join(format!("{number}{name}")));
+                    let frame = match name.rsplit('.').next() {
+                        Some("jpg") => &jpeg,
+                        Some("cr3") => &cr3,
+                        _ => &frames[&(pins & 0xFFFF)],
+                    };
+                    save(frame, &target, number, name);
                 }
             }
             before = pins;
@@ -358,12 +364,35 @@ fn watched(laboratory: &Laboratory, names: &'static [&'static str]) -> Result<Su
     let waiting = Waiting {
         arrival: Duration::from_millis(300),
         partner: Duration::from_millis(200),
+        second: Duration::from_millis(300),
         ..Waiting::default()
     };
     let mut camera = WatchedCamera::new(&folder, None, waiting);
     let port = PortChoice::Simulated(board);
     let first = words(laboratory.scan(port, &mut camera, Begin::Anew));
     then_resume(laboratory, first, SETTINGS.iso)
+}
+
+/// Saves a picture as other programs do: under a new name or one that repeats, the RAW file after its JPEG, or a second
+/// picture when the next light is on.
+fn save(frame: &Path, folder: &Path, number: usize, name: &'static str) {
+    let path = match name {
+        "late" => folder.join(format!("{number}late.dng")),
+        repeats if repeats.starts_with("capt") => folder.join(repeats),
+        _ => folder.join(format!("{number}{name}")),
+    };
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let frame = frame.to_owned();
+    match name {
+        "late" => drop(std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(270));
+            let _ = std::fs::copy(frame, path);
+        })),
+        _ => {
+            let _ = std::fs::copy(frame, path);
+            std::thread::sleep(Duration::from_millis(if name.ends_with("jpg") { 100 } else { 0 }));
+        }
+    }
 }
 
 const PROGRAM_ARGUMENTS: &str = "--exposure-s 0.02 --iso 1200";

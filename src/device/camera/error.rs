@@ -130,8 +130,22 @@ pub enum CameraError {
         /// The folder.
         folder: PathBuf,
     },
+    /// What came shows the same as the picture of an earlier light.
+    #[error("{}: shows the same as the picture of an earlier light, so it is a second picture of that light; release the shutter once a light, when asked", .file.display())]
+    SamePicture {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A file in the watched folder is of a kind that cannot be read.
+    #[error("{}: {why}", .file.display())]
+    Unsupported {
+        /// The file.
+        file: PathBuf,
+        /// What it is and what to do.
+        why: String,
+    },
     /// More than one picture came for one light.
-    #[error("{}: {count} pictures came for one light; release the shutter once a light, when asked", .folder.display())]
+    #[error("{}: {count} different pictures came for one light; release the shutter once a light, when asked", .folder.display())]
     SeveralArrived {
         /// The folder.
         folder: PathBuf,
@@ -190,6 +204,7 @@ impl CameraError {
             | Self::NothingArrived { .. }
             | Self::TooEarly { .. }
             | Self::SeveralArrived { .. }
+            | Self::SamePicture { .. }
             | Self::OutOfFocus
             | Self::Incomplete { .. } => Cure::Again,
             _ => Cure::Hands,

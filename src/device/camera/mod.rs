@@ -76,12 +76,19 @@ pub enum Applied {
     ByHand,
 }
 
-/// Hears of the shutter.
+/// Hears of the shutter, and knows the lights.
 pub trait Shutter {
     /// It is about to open.
     fn open(&mut self);
     /// It has closed.
     fn closed(&mut self);
+    /// The light board's outputs since [`Shutter::open`], bit n for output n; `None` where they are not known. Pictures under
+    /// other outputs must differ.
+    fn lit(&self) -> Option<u32> {
+        None
+    }
+    /// The camera waits for something that the user may have to do, or would want to know: a sentence without its full stop.
+    fn waiting(&mut self, _what: &str) {}
 }
 
 /// Hears nothing.

@@ -1,13 +1,16 @@
 //! Frames held against the plan and against each other: an LED that stays dark, two lights that are alike, clipping, focus.
 
-use super::look::Look;
 use super::plan::{Plan, Step};
 use super::sequencer::Judgement;
+use crate::device::look::{Look, difference};
+use std::collections::BTreeSet;
 
 /// A light that gives less than this share of what the others give has failed.
 const DARK: f64 = 0.1;
-/// Less than this share of the range over the ambient light is no light, whatever the others give.
+/// Less than this share of the range over the ambient light is no light.
 const NOTHING: f64 = 5e-4;
+/// So many lights without light in their frames, and none with: something common to all is wrong.
+const ALL_DARK: usize = 3;
 /// Lights whose pictures differ by no more than twice what noise makes of one light are one light; the noise is known from the
 /// drift check. Between these shares: less is no difference, and cloth under two lamps of a rig differs by more.
 const ALIKE: [f64; 2] = [0.005, 0.03];
@@ -25,12 +28,18 @@ const BLURRED: f64 = 0.7;
 pub struct Assessor {
     steps: Vec<Step>,
     looks: Vec<Option<Look>>,
+    /// Lights whose frames showed no light.
+    dark: BTreeSet<usize>,
 }
 
 impl Assessor {
     /// Nothing looked at yet.
     pub fn new(plan: &Plan) -> Self {
-        Self { steps: plan.steps.clone(), looks: vec![None; plan.steps.len()] }
+        Self {
+            steps: plan.steps.clone(),
+            looks: vec![None; plan.steps.len()],
+            dark: BTreeSet::new(),
+        }
     }
 
     /// Takes a frame and says what it, and those before it that it throws light on, are worth.
@@ -41,6 +50,7 @@ impl Assessor {
             .collect();
         for (k, _) in &dark {
             self.looks[*k] = None;
+            self.dark.extend(self.steps[*k].light);
         }
         if dark.iter().any(|(k, _)| *k == step) {
             return dark;
@@ -62,12 +72,24 @@ impl Assessor {
     fn why_dark(&self, step: usize) -> Option<String> {
         let light = self.steps[step].light?;
         let (own, factor) = (self.light(step)?, self.steps[step].factor);
-        let usual = self.usual_light(step).map_or(0.0, |usual| usual * factor);
-        // An exposure that is meant to be short may be dark, and still not empty.
-        let least = (DARK * usual).max(NOTHING * factor.min(1.0));
-        (own < least).then(|| {
-            format!("light {light} stays dark although the board switched it on; look at its LED, driver and wiring")
-        })
+        match self.usual_light(step).filter(|usual| *usual > NOTHING) {
+            Some(usual) => (own < DARK * usual * factor).then(|| stays_dark(light)),
+            // Nothing to compare with: the exposure may be to blame as well as the light. One that is meant to be short may
+            // be dark, and still not empty.
+            None => (own < NOTHING * factor.min(1.0))
+                .then(|| format!("light {light}: the picture shows no light")),
+        }
+    }
+
+    /// Why a step has no frame in the end, where its light is to blame: by then the others are known.
+    pub fn why_left_out(&self, step: usize) -> Option<String> {
+        self.steps[step].light.filter(|light| self.dark.contains(light)).map(stays_dark)
+    }
+
+    /// Whether several lights were tried and none showed: then it is not one LED that has failed.
+    pub fn nothing_is_lit(&self) -> bool {
+        let lit = |k: usize| self.steps[k].light.is_some() && self.looks[k].is_some();
+        self.dark.len() >= ALL_DARK && !(0..self.steps.len()).any(lit)
     }
 
     /// Median of what the other lights give, per exposure; `None` where fewer than two are there.
@@ -183,17 +205,10 @@ impl Assessor {
     }
 }
 
-/// How much two pictures differ beyond a common factor, relative.
-fn difference(a: &[f64], b: &[f64]) -> f64 {
-    if a.len() != b.len() {
-        return f64::INFINITY;
-    }
-    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-    let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
-    if aa <= 0.0 || bb <= 0.0 {
-        return f64::INFINITY;
-    }
-    (1.0 - (ab * ab / (aa * bb)).min(1.0)).sqrt()
+fn stays_dark(light: usize) -> String {
+    format!(
+        "light {light} stays dark although the board switched it on; look at its LED, driver and wiring"
+    )
 }
 
 #[cfg(test)]

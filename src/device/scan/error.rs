@@ -141,6 +141,22 @@ pub enum ScanError {
         /// How many frames are safe.
         kept: usize,
     },
+    /// No light shows under any light: the exposure is too short, or nothing shines.
+    #[error(
+        "the pictures show no light under any LED at {exposure_s} s and ISO {iso}; give a longer --exposure-s or leave it out, take the lens cap off, and look whether the LEDs have power"
+    )]
+    NothingLit {
+        /// Exposure time, seconds.
+        exposure_s: f64,
+        /// Sensitivity.
+        iso: f64,
+    },
+    /// The capture session's folder vanished.
+    #[error("{}: this folder is gone, and the frames in it; bring it back (was its disk unplugged?) and continue with --resume, or scan into another", .folder.display())]
+    FolderGone {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// Nothing to expose for.
     #[error(
         "light {light} gives no light at {exposure_s} s; look whether it shines on the swatch, or give --exposure-s"

@@ -1,10 +1,10 @@
 //! Test shots: how long to expose, and a preview for the technician.
 
 use super::ScanError;
-use super::look::Look;
 use super::shoot::{Shot, Told, shoot};
 use crate::device::board::Board;
 use crate::device::camera::{Camera, Settings};
+use crate::device::look::Look;
 use crate::raw::{Frame, Hint, decode};
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -148,7 +148,7 @@ fn test_shot(
     folder: &Path,
 ) -> Result<(Frame, Settings), ScanError> {
     board.light(output, None)?;
-    let shot = shoot(board, camera, (wanted, &mut Told::default()), folder);
+    let shot = shoot(board, camera, (wanted, &mut Told::default()), folder, &|_| ());
     board.off()?;
     let Shot { path, settings, .. } = shot?;
     let bytes = std::fs::read(&path).map_err(|e| crate::files::FileError::read(&path, e))?;
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn advice_for_a_test_shot() {
         let check = |high: f64, better_s: Option<f64>, expected: &str| {
-            let channel = super::super::look::Channel { name: "G", high, ..Default::default() };
+            let channel = crate::device::look::Channel { name: "G", high, ..Default::default() };
             let look =
                 Look { size_px: [1, 1], channels: vec![channel], sharpness: 0.0, sketch: vec![] };
             let settings = Settings { exposure_s: 0.5, iso: 100.0 };

@@ -1,6 +1,6 @@
 //! Looks at frames while the next one is being taken.
 
-use super::look::Look;
+use crate::device::look::Look;
 use crate::raw::{Hint, decode};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};

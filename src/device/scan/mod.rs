@@ -9,7 +9,6 @@ mod control;
 mod error;
 mod exposure;
 mod judge;
-mod look;
 mod open;
 mod plan;
 mod run;
@@ -19,17 +18,17 @@ mod store;
 mod subject;
 mod summary;
 
+pub use super::look::{BINS, Channel, Look};
 pub use assess::Assessor;
 pub use control::Control;
 pub use error::ScanError;
 pub use exposure::{Preview, preview};
-pub use look::{BINS, Channel, Look};
 pub use open::{CameraFinding, Instruments, diagnose_camera, open};
 pub use plan::{Plan, Step};
 pub use run::{Options, scan};
 pub use sequencer::{
     Action, Ending, Input, Judgement, MOST_ATTEMPTS, MOST_DARK, Sequencer, Trouble,
 };
-pub use store::{About, Begin};
+pub use store::{About, Begin, survey};
 pub use subject::{Pose, Sheet, Subject};
 pub use summary::{Event, Seconds, Summary};

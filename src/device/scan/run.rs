@@ -215,8 +215,22 @@ impl Run<'_> {
                 }
                 self.sequencer.tell(Input::Judged(step, judgement), self.start.elapsed());
             }
+            if self.assessor.nothing_is_lit() {
+                return Err(self.nothing_lit());
+            }
         }
         Ok(())
+    }
+
+    /// The dark frames leave the record: what resumes begins with another exposure.
+    fn nothing_lit(&mut self) -> ScanError {
+        let shown = self.base.unwrap_or(Settings { exposure_s: 0.0, iso: self.options.iso });
+        for step in 0..self.plan.steps.len() {
+            if let Err(error) = self.store.drop_frame(step) {
+                return error;
+            }
+        }
+        ScanError::NothingLit { exposure_s: shown.exposure_s, iso: shown.iso }
     }
 
     fn tell_again(&self, step: usize, why: String) {
@@ -300,7 +314,12 @@ impl Run<'_> {
         self.store.clear_incoming();
         let wanted = self.settings(step);
         let told = (wanted, &mut self.told);
-        match shoot(self.board, self.camera, told, self.store.incoming()) {
+        let (frame, tell) = (self.plan.steps[step].name(), self.tell);
+        let (done, total) = (self.sequencer.kept(), self.sequencer.total());
+        let waiting = |what: &str| {
+            tell(&Event::Waiting { frame: frame.clone(), what: what.to_owned(), done, total });
+        };
+        match shoot(self.board, self.camera, told, self.store.incoming(), &waiting) {
             Ok(shot) => {
                 self.seconds.exposing += shot.exposing.as_secs_f64();
                 self.seconds.transfer += shot.transfer.as_secs_f64();
@@ -438,7 +457,9 @@ impl Run<'_> {
     }
 
     fn end(&mut self, ending: Ending) -> Result<Summary, ScanError> {
-        let kept = self.store.session().frames.len();
+        let Some(kept) = self.store.safe_frames() else {
+            return Err(ScanError::FolderGone { folder: self.options.folder.clone() });
+        };
         match ending {
             Ending::Complete => Ok(self.summary()),
             Ending::Aborted => Err(ScanError::Aborted { kept }),
@@ -452,7 +473,10 @@ impl Run<'_> {
             Ending::Incomplete(steps) => {
                 let mut why: Vec<String> = steps
                     .iter()
-                    .filter_map(|&step| self.sequencer.reasons(step).last().cloned())
+                    .filter_map(|&step| {
+                        let last = self.sequencer.reasons(step).last().cloned();
+                        self.assessor.why_left_out(step).or(last)
+                    })
                     .collect();
                 why.dedup();
                 Err(ScanError::Incomplete { why, kept })

@@ -1,5 +1,6 @@
 //! One picture, with a look at the board's outputs when the shutter opens and closes.
 
+use crate::device::board::wire::TRIGGER_BIT;
 use crate::device::board::{Board, Outputs};
 use crate::device::camera::{Applied, Camera, CameraError, Release, Settings, Shutter};
 use std::path::{Path, PathBuf};
@@ -26,12 +27,13 @@ pub(super) struct Shot {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Told(Option<(Settings, Applied)>);
 
-/// Takes a picture into `folder` under whatever light is on.
+/// Takes a picture into `folder` under whatever light is on. `waiting` hears what a camera that is released by hand waits for.
 pub(super) fn shoot(
     board: &Board,
     camera: &mut dyn Camera,
     (wanted, told): (Settings, &mut Told),
     folder: &Path,
+    waiting: &dyn Fn(&str),
 ) -> Result<Shot, CameraError> {
     // After an error the camera may be another one, or switched on anew.
     let applied = match told.0.take() {
@@ -43,7 +45,7 @@ pub(super) fn shoot(
         Applied::ByHand => None,
     };
     let release = camera.describe().release;
-    let mut watch = Watch { board, release, open: None, close: None };
+    let mut watch = Watch { board, release, waiting, open: None, close: None };
     let path = camera.capture(folder, &mut watch)?;
     told.0 = Some((wanted, applied));
     let end = Instant::now();
@@ -56,6 +58,7 @@ pub(super) fn shoot(
 struct Watch<'a> {
     board: &'a Board,
     release: Release,
+    waiting: &'a dyn Fn(&str),
     open: Option<(Instant, Option<Outputs>)>,
     close: Option<(Instant, Option<Outputs>)>,
 }
@@ -79,5 +82,14 @@ impl Shutter for Watch<'_> {
     fn closed(&mut self) {
         let now = Instant::now();
         self.close = Some((now, self.outputs()));
+    }
+
+    fn lit(&self) -> Option<u32> {
+        let (_, outputs) = self.open?;
+        outputs.map(|outputs| outputs.pins & !(1 << TRIGGER_BIT))
+    }
+
+    fn waiting(&mut self, what: &str) {
+        (self.waiting)(what);
     }
 }

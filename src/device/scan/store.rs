@@ -70,17 +70,9 @@ impl Store {
         begin: Begin,
         plan: &Plan,
     ) -> Result<(Self, Found), ScanError> {
-        let there = folder.join(MANIFEST).exists().then(|| Session::load(folder)).transpose()?;
-        let writer = match (there, begin) {
-            (Some(session), Begin::Anew) => {
-                let (name, frames) = (session.name, session.frames.len());
-                return Err(ScanError::Taken { folder: folder.to_owned(), name, frames });
-            }
-            (Some(session), Begin::Resume) => {
-                check_same(&session, (about, subject), plan)?;
-                SessionWriter::resume(folder)?
-            }
-            (None, _) => SessionWriter::create(new_session(folder, about, subject))?,
+        let writer = match load_for(folder, (about, subject), begin, plan)? {
+            Some(_) => SessionWriter::resume(folder)?,
+            None => SessionWriter::create(new_session(folder, about, subject))?,
         };
         let incoming = folder.join(INCOMING);
         let failed = |source| FileError::write(&incoming, source);
@@ -98,32 +90,21 @@ impl Store {
     fn find(&mut self, plan: &Plan) -> Result<Found, ScanError> {
         let mut found = Found::default();
         for (k, step) in plan.steps.iter().enumerate() {
-            let session = self.writer.session();
-            let Some(entry) = session.frames.iter().find(|entry| is_of(entry, step)).cloned()
-            else {
-                continue;
-            };
-            // A board that lies better now is photographed anew; the earlier picture stays until then.
-            if step.board.is_some() {
-                self.files[k] = Some(entry.file);
-                continue;
-            }
-            match session.read_frame(&entry) {
-                Ok(_) => {
-                    self.files[k] = Some(entry.file);
-                    found.finished.push(k);
+            match state_of(self.writer.session(), step)? {
+                State::Absent => {}
+                State::Retaken(file) => self.files[k] = Some(file),
+                State::Kept(entry) => {
                     if step.factor == 1.0 {
                         let (exposure_s, iso) = (entry.exposure_s, entry.iso);
                         found.settings = Some(Settings { exposure_s, iso });
                     }
+                    self.files[k] = Some(entry.file);
+                    found.finished.push(k);
                 }
-                Err(
-                    error @ (SessionError::FrameMissing { .. } | SessionError::FrameAltered { .. }),
-                ) => {
-                    found.warnings.push(format!("{error}. It is taken again."));
-                    self.writer.remove(&entry.file)?;
+                State::Lost(file, why) => {
+                    found.warnings.push(format!("{why}. It is taken again."));
+                    self.writer.remove(&file)?;
                 }
-                Err(error) => return Err(error.into()),
             }
         }
         Ok(found)
@@ -137,6 +118,13 @@ impl Store {
     /// The capture session so far.
     pub(super) fn session(&self) -> &Session {
         self.writer.session()
+    }
+
+    /// How many recorded frames have their file; `None` where the capture session is gone from its folder.
+    pub(super) fn safe_frames(&self) -> Option<usize> {
+        let session = self.session();
+        let there = |entry: &&FrameEntry| session.frame_path(entry).is_file();
+        session.manifest_path().is_file().then(|| session.frames.iter().filter(there).count())
     }
 
     /// The file that is recorded for a step.
@@ -175,6 +163,81 @@ impl Store {
             let _ = fs::remove_file(entry.path());
         }
     }
+}
+
+/// What a capture session has of one step.
+enum State {
+    Absent,
+    /// Its frame is there, as it was recorded.
+    Kept(FrameEntry),
+    /// A board that lies better now is photographed again; the earlier picture stays until then.
+    Retaken(PathBuf),
+    /// It is recorded, but its file is missing or altered; a sentence without its full stop.
+    Lost(PathBuf, String),
+}
+
+fn state_of(session: &Session, step: &Step) -> Result<State, ScanError> {
+    let Some(entry) = session.frames.iter().find(|entry| is_of(entry, step)) else {
+        return Ok(State::Absent);
+    };
+    if step.board.is_some() {
+        return Ok(State::Retaken(entry.file.clone()));
+    }
+    match session.read_frame(entry) {
+        Ok(_) => Ok(State::Kept(entry.clone())),
+        Err(error @ (SessionError::FrameMissing { .. } | SessionError::FrameAltered { .. })) => {
+            Ok(State::Lost(entry.file.clone(), error.to_string()))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The capture session in `folder`, if there is one and the scan may go on with it.
+fn load_for(
+    folder: &Path,
+    (about, subject): (&About, &Subject),
+    begin: Begin,
+    plan: &Plan,
+) -> Result<Option<Session>, ScanError> {
+    let there = folder.join(MANIFEST).exists().then(|| Session::load(folder)).transpose()?;
+    match (there, begin) {
+        (Some(session), Begin::Anew) => {
+            let (name, frames) = (session.name, session.frames.len());
+            Err(ScanError::Taken { folder: folder.to_owned(), name, frames })
+        }
+        (Some(session), Begin::Resume) => {
+            check_same(&session, (about, subject), plan)?;
+            Ok(Some(session))
+        }
+        (None, _) => Ok(None),
+    }
+}
+
+/// What a scan into `folder` would find there, per step of the plan: whether its frame need not be taken again. Writes nothing.
+/// Also gives sentences about frames that are not as they were recorded.
+///
+/// # Errors
+/// As the scan itself before its first frame: another capture session, or one that is not to be continued.
+pub fn survey(
+    folder: &Path,
+    whose: (&About, &Subject),
+    begin: Begin,
+    plan: &Plan,
+) -> Result<(Vec<bool>, Vec<String>), ScanError> {
+    let Some(session) = load_for(folder, whose, begin, plan)? else {
+        return Ok((vec![false; plan.steps.len()], Vec::new()));
+    };
+    let mut warnings = Vec::new();
+    let mut kept = |step: &Step| match state_of(&session, step)? {
+        State::Kept(_) => Ok(true),
+        State::Lost(_, why) => {
+            warnings.push(format!("{why}. It will be taken again."));
+            Ok(false)
+        }
+        State::Absent | State::Retaken(_) => Ok(false),
+    };
+    let there = plan.steps.iter().map(&mut kept).collect::<Result<_, ScanError>>()?;
+    Ok((there, warnings))
 }
 
 impl Drop for Store {

@@ -18,6 +18,17 @@ pub enum Event {
         /// Time left, once known.
         left: Option<Duration>,
     },
+    /// The camera waits for something: with a camera that is released by hand, for the picture.
+    Waiting {
+        /// As in "light 4".
+        frame: String,
+        /// What for; a sentence without its full stop.
+        what: String,
+        /// Frames that are there.
+        done: usize,
+        /// Frames that there will be.
+        total: usize,
+    },
     /// A frame is safe on disk.
     Kept {
         /// Its light; `None`: every LED off.

@@ -237,6 +237,10 @@ fn hear(event: &Event, out: &Outbox) {
         Event::Frame { frame, done, total, left } => {
             out.progress(*done as f64 / (*total).max(1) as f64, frame, *left);
         }
+        Event::Waiting { frame, what, done, total } => {
+            let share = *done as f64 / (*total).max(1) as f64;
+            out.progress(share, &format!("{frame}: {what}"), None);
+        }
         Event::Again { frame, why } => out.warn(frame, std::slice::from_ref(why)),
         Event::BoardLost => out.progress(0.0, texts::BOARD_LOST, None),
         Event::Kept { .. } | Event::Paused => {}

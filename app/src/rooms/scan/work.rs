@@ -103,6 +103,10 @@ fn hear(event: &Event, eyes: &Eyes, out: &Outbox) {
             file: file.clone(),
             settings: *settings,
         }),
+        Event::Waiting { frame, what, done, total } => {
+            let share = *done as f64 / (*total).max(1) as f64;
+            out.progress(share, &format!("{frame}: {what}"), None);
+        }
         Event::Again { frame, why } => out.warn(frame, &[texts::again(why)]),
         Event::BoardLost => out.progress(0.0, texts::BOARD_LOST, None),
         Event::Paused => out.tell(Update::Scan(Told::Paused)),

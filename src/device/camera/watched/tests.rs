@@ -1,12 +1,33 @@
 use super::*;
-use std::io::Write;
+use std::io::{self, Write};
 use std::thread::JoinHandle;
 
-/// A RAW file of the smallest kind, and its bytes.
+/// A RAW file of the smallest kind.
 fn raw() -> Vec<u8> {
-    let options = crate::simulate::Options { size_px: Some([16, 16]), ..Default::default() };
+    under_light(0, 0)
+}
+
+/// A RAW file whose picture leans towards `light`; `take` makes other noise.
+fn under_light(light: usize, take: usize) -> Vec<u8> {
+    const SIDE: usize = 32;
+    let options = crate::simulate::Options { size_px: Some([SIDE; 2]), ..Default::default() };
     let instrument = crate::simulate::Instrument::from_options(&options).unwrap();
-    instrument.encode(&[700; 256], 0.5, 100.0, None).unwrap()
+    let black = 600;
+    let photosite = |k: usize| {
+        let (x, y) = (k % SIDE, k / SIDE);
+        let lean = if light % 2 == 0 { x } else { y };
+        let noise = (k * (2 * take + 7)) % 5;
+        (black + 1500 + 40 * (light + 1) * lean + noise) as u16
+    };
+    let samples: Vec<u16> = (0..SIDE * SIDE).map(photosite).collect();
+    instrument.encode(&samples, 0.5, 100.0, None).unwrap()
+}
+
+/// The beginning of a Canon CR3, which is not read.
+fn cr3() -> Vec<u8> {
+    let mut bytes = b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom".to_vec();
+    bytes.resize(4096, 7);
+    bytes
 }
 
 fn jpeg() -> Vec<u8> {
@@ -16,10 +37,11 @@ fn jpeg() -> Vec<u8> {
 }
 
 const WAITING: Waiting = Waiting {
-    arrival: Duration::from_millis(600),
-    completion: Duration::from_millis(400),
+    arrival: Duration::from_millis(2000),
+    completion: Duration::from_millis(1000),
     rest: Duration::from_millis(60),
-    partner: Duration::from_millis(300),
+    partner: Duration::from_millis(1500),
+    second: Duration::from_millis(1000),
     look: Duration::from_millis(5),
 };
 
@@ -32,6 +54,7 @@ fn other_program(folder: &Path, steps: Vec<Step>) -> JoinHandle<()> {
         for (ms, name, content) in steps {
             std::thread::sleep(Duration::from_millis(ms));
             let path = folder.join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
             match content {
                 Some(bytes) => {
                     let file = fs::File::options().create(true).append(true).open(path);
@@ -47,6 +70,7 @@ fn other_program(folder: &Path, steps: Vec<Step>) -> JoinHandle<()> {
 fn capture(before: &[(&str, Vec<u8>)], steps: Vec<Step>, exposure_s: f64) -> String {
     let (watched, target) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     for (name, bytes) in before {
+        fs::create_dir_all(watched.path().join(name).parent().unwrap()).unwrap();
         fs::write(watched.path().join(name), bytes).unwrap();
     }
     let mut camera = WatchedCamera::new(watched.path(), None, WAITING);
@@ -60,7 +84,6 @@ fn capture(before: &[(&str, Vec<u8>)], steps: Vec<Step>, exposure_s: f64) -> Str
         Ok(path) => {
             assert_eq!(shutter.0, ["open", "closed"]);
             assert_eq!(fs::read(&path).unwrap(), raw(), "whole");
-            assert!(watched.path().join(path.file_name().unwrap()).exists(), "theirs stays theirs");
             path.file_name().unwrap().to_string_lossy().into_owned()
         }
         Err(error) => format!("{error:?}"),
@@ -108,10 +131,105 @@ fn the_right_file_is_taken_when_it_is_whole() {
         &[("a.dng", raw.clone())],
         vec![(20, "a.jpg", Some(jpeg())), whole(400)],
     );
+    check(
+        "its JPEG is there already",
+        &[("b.jpg", jpeg()), ("a.dng", raw.clone())],
+        vec![whole(100)],
+    );
+    check("a long time after its JPEG", &[], vec![(20, "b.jpg", Some(jpeg())), whole(250)]);
+    check(
+        "a name that repeats",
+        &[("b.dng", under_light(3, 0)), ("b.jpg", jpeg())],
+        vec![(20, "b.jpg", None), (0, "b.jpg", Some(jpeg())), (30, "b.dng", None), whole(0)],
+    );
+    let by_date = |ms, folder: &'static str| (ms, folder, Some(raw.clone()));
+    check(
+        "in a folder by date",
+        &[("2026/11-29/b.dng", raw.clone())],
+        vec![by_date(30, "2026/11-30/b.dng")],
+    );
+    check(
+        "JPEG and RAW in folders of their own",
+        &[],
+        vec![(20, "JPG/b.jpg", Some(jpeg())), by_date(100, "RAW/b.dng")],
+    );
+    check("saved twice", &[], vec![whole(20), (0, "RAW/b.dng", Some(raw.clone()))]);
+    check(
+        "hidden folders are not looked into",
+        &[],
+        vec![(20, ".cache/x.dng", Some(under_light(2, 0))), whole(60)],
+    );
+}
+
+/// Knows which outputs are lit.
+struct Lit(u32, Vec<String>);
+
+impl Shutter for Lit {
+    fn open(&mut self) {}
+
+    fn closed(&mut self) {}
+
+    fn lit(&self) -> Option<u32> {
+        Some(self.0)
+    }
+
+    fn waiting(&mut self, what: &str) {
+        self.1.push(what.to_owned());
+    }
+}
+
+/// Takes one picture per light, of which the other program writes `steps`; the bytes taken or the error, and what was said.
+fn scan(lights: Vec<(u32, Vec<Step>)>) -> Vec<(Result<Vec<u8>, String>, Vec<String>)> {
+    let (watched, target) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut camera = WatchedCamera::new(watched.path(), None, WAITING);
+    let mut one = |(lit, steps)| {
+        let program = other_program(watched.path(), steps);
+        let mut shutter = Lit(lit, Vec::new());
+        let taken = camera.capture(target.path(), &mut shutter);
+        program.join().unwrap();
+        let bytes = taken.map(|path| fs::read(path).unwrap()).map_err(|e| format!("{e:?}"));
+        (bytes, shutter.1)
+    };
+    lights.into_iter().map(&mut one).collect()
 }
 
 #[test]
-fn what_is_wrong_is_told() {
+fn a_second_picture_of_one_light_is_not_the_next_lights() {
+    let (first, again, next) = (under_light(0, 0), under_light(0, 1), under_light(1, 0));
+    let write = |ms, name, bytes: &Vec<u8>| (ms, name, Some(bytes.clone()));
+    let check = |late: &Vec<u8>, why: &str| {
+        let taken = scan(vec![
+            (1, vec![write(20, "a.dng", &first)]),
+            (2, vec![write(20, "b.dng", late), write(200, "c.dng", &next)]),
+        ]);
+        assert_eq!(taken[0].0, Ok(first.clone()));
+        assert_eq!(taken[1].0, Ok(next.clone()), "{why}");
+        assert!(taken[1].1[1].contains(&format!("b.dng {why}, and is left out")), "{taken:?}");
+    };
+    check(&again, "shows the same as an earlier light's");
+    check(&first, "is a copy of an earlier picture");
+    // The very light again is no second picture; and two lights before is as bad as one.
+    let taken = scan(vec![
+        (1, vec![write(20, "a.dng", &first)]),
+        (1, vec![write(20, "b.dng", &again)]),
+        (2, vec![write(20, "c.dng", &next)]),
+        (4, vec![write(20, "d.dng", &again), write(100, "e.dng", &under_light(2, 0))]),
+    ]);
+    let bytes: Vec<Vec<u8>> = taken.into_iter().map(|(bytes, _)| bytes.unwrap()).collect();
+    assert_eq!(bytes, [first, again, next, under_light(2, 0)]);
+}
+
+#[test]
+fn two_outputs_at_one_led_are_taken_at_the_second_try() {
+    let write = |name, take| vec![(20, name, Some(under_light(0, take)))];
+    let taken = scan(vec![(1, write("a.dng", 0)), (2, write("b.dng", 1)), (2, write("c.dng", 2))]);
+    let error = taken[1].0.as_ref().unwrap_err();
+    assert!(error.starts_with("SamePicture"), "{error}");
+    assert_eq!(taken[2].0, Ok(under_light(0, 2)));
+}
+
+#[test]
+fn what_is_wrong_is_reported() {
     let raw = raw();
     let check = |steps: Vec<Step>, exposure_s: f64, expected: &str| {
         let said = capture(&[], steps, exposure_s);
@@ -120,10 +238,10 @@ fn what_is_wrong_is_told() {
     check(vec![], 0.0, "NothingArrived");
     check(vec![(20, "a.jpg", Some(jpeg()))], 0.0, "NotRaw { found: \"JPG\" }");
     check(vec![(20, "a.dng", Some(raw[..300].to_vec()))], 0.0, "Incomplete");
-    check(vec![(20, "notes.pdf", Some(b"%PDF".to_vec()))], 0.0, "Incomplete");
+    check(vec![(20, "a.cr3", Some(cr3()))], 0.0, "Unsupported");
     check(vec![(20, "a.dng", Some(raw.clone()))], 0.3, "TooEarly");
     check(
-        vec![(20, "a.dng", Some(raw.clone())), (0, "b.dng", Some(raw.clone()))],
+        vec![(20, "a.dng", Some(raw.clone())), (0, "b.dng", Some(under_light(1, 0)))],
         0.0,
         "SeveralArrived",
     );

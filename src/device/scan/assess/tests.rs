@@ -1,5 +1,5 @@
 use super::*;
-use crate::device::scan::look::Channel;
+use crate::device::look::Channel;
 use crate::device::scan::plan::tests::reference_rig;
 
 /// A frame of this brightness whose sketch leans towards `side`.
@@ -46,7 +46,9 @@ fn a_light_that_stays_dark_is_found_wherever_it_is() {
                 (step.light == Some(light) && !step.drift_check).then(|| look(mean, 0.0))
             });
             assert_eq!(judged.len(), 1, "light {light} at {mean}: {judged:?}");
-            assert!(judged[0].starts_with(&format!("light-{light:02}: light {light} stays dark")));
+            // Before two others are known, the exposure may be to blame.
+            let why = if light < 2 { ": the picture shows no light" } else { " stays dark" };
+            assert_eq!(judged[0].find(&format!("light-{light:02}: light {light}{why}")), Some(0));
         }
     }
     let (judged, _) =
@@ -88,4 +90,28 @@ fn advice() {
         &|step| step.drift_check.then(|| Look { sharpness: 0.1, ..good(step) }),
         "The last frame is blurred",
     );
+}
+
+#[test]
+fn where_nothing_is_lit_no_single_light_is_blamed() {
+    let plan = Plan::new(&reference_rig(), &[]).unwrap();
+    let mut assessor = Assessor::new(&plan);
+    for k in 0..4 {
+        assert!(!assessor.nothing_is_lit(), "after {k} frames");
+        let judged = assessor.add(k, look(0.0101, 0.0));
+        let blamed = |(_, judgement): &(usize, Judgement)| match judgement {
+            Judgement::Dark(why) => why.contains("LED"),
+            _ => false,
+        };
+        assert!(!judged.iter().any(blamed), "{judged:?}");
+    }
+    assert!(assessor.nothing_is_lit());
+    // A weak light is light: then one that stays dark is at fault.
+    let mut assessor = Assessor::new(&plan);
+    for (k, step) in plan.steps.iter().enumerate() {
+        let mean = if step.light == Some(2) { 0.01 } else { 0.0112 };
+        assessor.add(k, step.light.map_or(look(0.01, 0.0), |_| look(mean, 0.0)));
+    }
+    assert!(!assessor.nothing_is_lit());
+    assert!(assessor.why_dark(3).is_none(), "it was taken out");
 }

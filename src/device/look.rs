@@ -74,6 +74,20 @@ impl Look {
     }
 }
 
+/// How much two sketches differ beyond a common factor: the sine of the angle between them, 0 to 1. Infinite where their
+/// sizes differ or one of them is black.
+pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return f64::INFINITY;
+    }
+    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+    let (aa, ab, bb) = (dot(a, a), dot(a, b), dot(b, b));
+    if aa <= 0.0 || bb <= 0.0 {
+        return f64::INFINITY;
+    }
+    (1.0 - (ab * ab / (aa * bb)).min(1.0)).sqrt()
+}
+
 struct Grid<'a> {
     frame: &'a Frame,
     channels: usize,
