@@ -88,7 +88,7 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let plan = Plan::of(&rig, &subject, &args.bracket, &there).map_err(failure)?;
     match &args.out {
         _ if args.dry_run => describe_plan(&plan, args, &subject),
-        Some(out) => photograph(args, &rig, subject, out.clone()),
+        Some(out) => photograph(args, &rig, out),
         None => Err(Failure::call("--out is missing; name a folder, as in --out linen-4021")),
     }
 }
@@ -110,15 +110,12 @@ fn failure(error: ScanError) -> Failure {
     }
 }
 
-fn photograph(
-    args: &Args,
-    rig: &Rig,
-    subject: Subject,
-    folder: PathBuf,
-) -> Result<Output, Failure> {
-    let Instruments { board, mut camera } = open(rig, &args.rig).map_err(failure)?;
+fn photograph(args: &Args, rig: &Rig, folder: &Path) -> Result<Output, Failure> {
+    let Instruments { board, mut camera, lock: _lock } = open(rig, &args.rig).map_err(failure)?;
+    // Only now, when no other process adds pictures, is it certain which one comes next.
+    let subject = args.target.subject(args.light.unwrap_or(0), frames_in(folder).is_empty())?;
     let options = Options {
-        folder,
+        folder: folder.to_owned(),
         subject,
         about: About { name: args.name.clone(), thickness_mm: args.thickness_mm },
         begin: begin(args),
@@ -242,7 +239,7 @@ fn look(args: &Args, rig: &Rig, plan: &Plan) -> Result<Output, Failure> {
         let last = rig.lights.len() - 1;
         Failure::call(format!("--light is {light}; the rig has lights 0 to {last}"))
     })?;
-    let Instruments { board, mut camera } = open(rig, &args.rig).map_err(failure)?;
+    let Instruments { board, mut camera, lock: _lock } = open(rig, &args.rig).map_err(failure)?;
     let wanted = Settings { exposure_s: args.exposure_s.unwrap_or(PREVIEW_S), iso: args.iso };
     let seen = preview(&board, camera.as_mut(), (light, output), wanted).map_err(failure)?;
     Ok(Output { text: of_preview(&seen), json: preview_json(&seen), ..Output::default() })

@@ -1,3 +1,4 @@
+use super::LockError;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -74,6 +75,9 @@ pub enum FileError {
         /// What is in the way, and why it stays.
         what: String,
     },
+    /// Another process writes there.
+    #[error(transparent)]
+    InUse(#[from] LockError),
 }
 
 impl FileError {

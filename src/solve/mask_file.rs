@@ -4,7 +4,7 @@ use super::load::{load, read_mask};
 use super::options::{MaskChoice, Options, Reuse};
 use super::swatch::{Swatch, find_swatch};
 use super::{Progress, SolveError, leave_out_what_adds_nothing};
-use crate::files::{FileError, write_atomic};
+use crate::files::{FileError, Lock, parent_of, write_atomic};
 use crate::instrument::Calibration;
 use crate::raster::encode_png_grey8;
 use crate::session::Session;
@@ -51,9 +51,10 @@ pub fn make_mask(
     options: &MaskOptions,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<MaskMade, SolveError> {
+    let path = options.out.clone().unwrap_or_else(|| options.session.join(MASK_FILE));
+    let _locks = lock(&options.session, &path)?;
     let mut session = Session::load(&options.session)?;
     let calibration = Calibration::load(&options.calibration)?;
-    let path = options.out.clone().unwrap_or_else(|| session.folder.join(MASK_FILE));
     let solving = Options {
         mask: MaskChoice::Everything,
         ..Options::new(&options.session, &options.calibration, "")
@@ -72,6 +73,18 @@ pub fn make_mask(
     };
     let named = name_in_session(&mut session, &path)?;
     Ok(MaskMade { path, swatch, up_to_date, named, warnings })
+}
+
+/// No other process may write the picture meanwhile, nor the manifest that will name it.
+fn lock(session: &Path, path: &Path) -> Result<[Option<Lock>; 2], FileError> {
+    let folder = |path: &Path| path.canonicalize().ok();
+    let inside = match (folder(parent_of(path)), folder(session)) {
+        (Some(parent), Some(session)) => parent.starts_with(session),
+        _ => false,
+    };
+    let whole = inside.then(|| Lock::acquire(session, "mask")).transpose()?;
+    let alone = (!inside).then(|| Lock::beside(path, "mask")).transpose()?;
+    Ok([whole, alone])
 }
 
 fn write_mask(path: &Path, mask: &Image<bool>) -> Result<(), FileError> {

@@ -27,7 +27,7 @@ fn photograph(rig: &Path, (lying, laid): (Lying, Subject), exposure_s: f64) -> S
     let file = rig.join("rig.toml");
     lay(&file, lying).unwrap();
     let described = Rig::load(&file).unwrap();
-    let Instruments { board, mut camera } = open(&described, &file).unwrap();
+    let Instruments { board, mut camera, lock: _lock } = open(&described, &file).unwrap();
     let options = Options {
         folder: rig.join("scanned").join(format!("{:?}", laid.kind())),
         subject: laid,

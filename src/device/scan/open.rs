@@ -7,6 +7,7 @@ use crate::device::camera::{
     Camera, CameraError, SimulatedCamera, Tether, TetheredCamera, UsbCamera, Waiting,
     WatchedCamera, usb_cameras,
 };
+use crate::files::{FileError, Lock};
 use crate::instrument::{CameraKind, Rig};
 use std::fmt;
 use std::path::Path;
@@ -17,6 +18,8 @@ pub struct Instruments {
     pub board: Board,
     /// The camera.
     pub camera: Box<dyn Camera>,
+    /// Keeps other processes from the same rig for as long as these are open.
+    pub lock: Lock,
 }
 
 impl fmt::Debug for Instruments {
@@ -29,13 +32,15 @@ impl fmt::Debug for Instruments {
 /// Opens what `rig`, read from `path`, describes. A watched folder that is not absolute is beside the rig's file.
 ///
 /// # Errors
-/// Where board or camera are not there, not ours, or not as the rig says.
+/// Where another process has the rig open, or board or camera are not there, not ours, or not as the rig says.
 pub fn open(rig: &Rig, path: &Path) -> Result<Instruments, ScanError> {
+    // The name of what is locked by is that of the file: every scan names it.
+    let lock = Lock::beside(path, "rig").map_err(FileError::from)?;
     let choice = PortChoice::of_rig(rig);
     // The camera first: whatever is wrong with it is told before the lights flash.
     let camera = open_camera(rig, path, &choice)?;
     let board = Board::open(choice, Some(rig.lights.len()))?;
-    Ok(Instruments { board, camera })
+    Ok(Instruments { board, camera, lock })
 }
 
 /// What `doctor` tells of one camera.

@@ -8,7 +8,7 @@ use super::judge::{Judge, Seen};
 use super::plan::{Plan, Step};
 use super::sequencer::{Action, Ending, Input, Judgement, Sequencer, Trouble};
 use super::shoot::{Shot, Told, shoot};
-use super::store::{About, Begin, Store, Taken, check_room};
+use super::store::{About, Begin, Place, Store, Taken, check_room};
 use super::subject::Subject;
 use super::summary::{Event, Seconds, Summary};
 use crate::device::board::{Board, BoardError, Failure};
@@ -72,11 +72,14 @@ pub fn scan(
     tell: &dyn Fn(&Event),
 ) -> Result<Summary, ScanError> {
     let start = Instant::now();
-    let (plan, left_out) = check(rig, options, camera)?;
     let size_px = [rig.camera.width_px, rig.camera.height_px];
-    check_room(&options.folder, size_px, plan.steps.len())?;
+    let (foreseen, _) = check(rig, options, camera)?;
+    check_room(&options.folder, size_px, foreseen.steps.len())?;
+    let place = Place::take(&options.folder)?;
+    // Another process may have added pictures until now.
+    let (plan, left_out) = check(rig, options, camera)?;
     let whose = (&options.about, &options.subject);
-    let (store, mut found) = Store::open(&options.folder, whose, options.begin, &plan)?;
+    let (store, mut found) = Store::open(place, whose, options.begin, &plan)?;
     if left_out {
         found.warnings.push(LINEARITY_BY_HAND.to_owned());
     }

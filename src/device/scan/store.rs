@@ -4,7 +4,7 @@ use super::ScanError;
 use super::plan::{Plan, Step};
 use super::subject::{Pose, Subject};
 use crate::device::camera::Settings;
-use crate::files::{FileError, free_bytes};
+use crate::files::{FileError, Lock, free_bytes};
 use crate::session::{FrameEntry, Kind, MANIFEST, Session, SessionError, SessionWriter};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -32,6 +32,21 @@ pub enum Begin {
     Resume,
 }
 
+/// The folder of a capture session that no other process writes to.
+#[derive(Debug)]
+pub(super) struct Place {
+    folder: PathBuf,
+    lock: Lock,
+}
+
+impl Place {
+    /// The folder is made where it is absent.
+    pub(super) fn take(folder: &Path) -> Result<Self, FileError> {
+        fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+        Ok(Self { folder: folder.to_owned(), lock: Lock::acquire(folder, "scan")? })
+    }
+}
+
 /// The capture session on disk.
 #[derive(Debug)]
 pub(super) struct Store {
@@ -39,6 +54,8 @@ pub(super) struct Store {
     incoming: PathBuf,
     /// Per step: the file that is recorded for it.
     files: Vec<Option<PathBuf>>,
+    /// Dropped last: until then, nothing else writes there.
+    _lock: Lock,
 }
 
 /// A frame to be stored.
@@ -63,13 +80,14 @@ pub(super) struct Found {
 }
 
 impl Store {
-    /// Begins or continues the capture session in `folder`.
+    /// Begins or continues the capture session in `place`.
     pub(super) fn open(
-        folder: &Path,
+        Place { folder, lock }: Place,
         (about, subject): (&About, &Subject),
         begin: Begin,
         plan: &Plan,
     ) -> Result<(Self, Found), ScanError> {
+        let folder = &*folder;
         let writer = match load_for(folder, (about, subject), begin, plan)? {
             Some(_) => SessionWriter::resume(folder)?,
             None => SessionWriter::create(new_session(folder, about, subject))?,
@@ -81,7 +99,7 @@ impl Store {
             fs::remove_dir_all(&incoming).map_err(failed)?;
         }
         fs::create_dir(&incoming).map_err(failed)?;
-        let mut store = Self { writer, files: vec![None; plan.steps.len()], incoming };
+        let mut store = Self { writer, files: vec![None; plan.steps.len()], incoming, _lock: lock };
         let found = store.find(plan)?;
         Ok((store, found))
     }
@@ -341,7 +359,7 @@ mod tests {
     }
 
     fn open(folder: &Path, begin: Begin) -> Result<(Store, Found), ScanError> {
-        Store::open(folder, (&ABOUT, &Subject::Swatch), begin, &plan())
+        Store::open(Place::take(folder)?, (&ABOUT, &Subject::Swatch), begin, &plan())
     }
 
     fn keep(store: &mut Store, step: usize, content: &str) {
@@ -407,7 +425,8 @@ mod tests {
         drop(store);
         let check = |about: About, plan: &Plan, expected: &str| {
             let whose = (&about, &Subject::Swatch);
-            let error = Store::open(home.path(), whose, Begin::Resume, plan).unwrap_err();
+            let error = Store::open(Place::take(home.path()).unwrap(), whose, Begin::Resume, plan)
+                .unwrap_err();
             assert!(error.to_string().contains(expected), "{error}");
         };
         check(About { name: Some("denim".into()), ..ABOUT }, &plan(), "not \"denim\"");
@@ -428,7 +447,9 @@ mod tests {
             let there = Session::load(home.path()).map_or(Vec::new(), |session| session.frames);
             let plan = Plan::of(&reference_rig(), &subject, &[], &there).unwrap();
             let whose = (&ABOUT, &subject);
-            let (mut store, found) = Store::open(home.path(), whose, Begin::Resume, &plan).unwrap();
+            let (mut store, found) =
+                Store::open(Place::take(home.path()).unwrap(), whose, Begin::Resume, &plan)
+                    .unwrap();
             assert!(found.finished.is_empty());
             let path = store.incoming().join("DSC_1.NEF");
             fs::write(&path, content).unwrap();
@@ -458,7 +479,9 @@ mod tests {
         let subject = Subject::Board { board: other, pose: Pose::Free, light: 0 };
         let plan = Plan::of(&reference_rig(), &subject, &[], &[]).unwrap();
         let whose = (&ABOUT, &subject);
-        let error = Store::open(home.path(), whose, Begin::Resume, &plan).unwrap_err().to_string();
+        let error = Store::open(Place::take(home.path()).unwrap(), whose, Begin::Resume, &plan)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("its [target] is another one"), "{error}");
     }
 
