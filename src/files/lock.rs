@@ -39,7 +39,7 @@ pub struct Lock {
 
 /// The place is in use by another program, or by another part of this one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}: in use by {}; wait until that is done, or stop it{}", .path.display(), who(.holder), remedy(.holder.as_ref(), .lock_file))]
+#[error("{}: in use by {}; wait until that is done, or stop it{}", .path.display(), who(.holder.as_ref()), remedy(.holder.as_ref(), .lock_file))]
 pub struct LockError {
     /// What was to be locked.
     pub path: PathBuf,
