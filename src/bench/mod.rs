@@ -35,8 +35,7 @@ pub const BENCH_JSON: &str = "bench.json";
 /// The picture, in the output folder.
 pub const BENCH_SVG: &str = "bench.svg";
 
-const OUTPUT: OutputKind =
-    OutputKind { name: "benchmark", marker: Some(BENCH_JSON), members: &[BENCH_JSON, BENCH_SVG] };
+const OUTPUT: OutputKind = OutputKind { name: "benchmark", marker: Some(BENCH_JSON) };
 
 /// What to measure.
 #[derive(Clone, Debug)]

@@ -1,4 +1,6 @@
 use super::FileError;
+use super::hidden::RANDOM;
+use std::ffi::OsStr;
 use std::fs::{File, Permissions};
 use std::io::Write;
 use std::path::Path;
@@ -34,20 +36,40 @@ pub(super) fn sync_folder(folder: &Path) {
     }
 }
 
+/// How the names of temporary files begin.
+const TEMPORARY: &str = ".weavelight-partial-";
+
+/// Whether a file of this name is one that [`write_atomic`] had not finished.
+pub(super) fn is_temporary(name: &OsStr) -> bool {
+    let random = name.as_encoded_bytes().strip_prefix(TEMPORARY.as_bytes());
+    random.is_some_and(|rest| rest.len() == RANDOM && rest.iter().all(u8::is_ascii_alphanumeric))
+}
+
+/// Takes away what writers that were killed left in `folder`. Only for whoever holds the folder's [`super::Lock`]: the file of a
+/// process that still writes would go too.
+pub fn clean_temporary(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        if is_file && is_temporary(&entry.file_name()) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Temporary files are private by default; what is renamed into place gets the permissions any new file gets.
 #[cfg(unix)]
 fn builder(path: &Path) -> tempfile::Builder<'static, 'static> {
     use std::os::unix::fs::PermissionsExt;
     let mode = std::fs::metadata(path).map_or(0o666, |old| old.permissions().mode() & 0o777);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".partial-").permissions(Permissions::from_mode(mode));
+    builder.prefix(TEMPORARY).permissions(Permissions::from_mode(mode));
     builder
 }
 
 #[cfg(not(unix))]
 fn builder(_path: &Path) -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".partial-");
+    builder.prefix(TEMPORARY);
     builder
 }
 

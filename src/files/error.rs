@@ -1,4 +1,4 @@
-use super::LockError;
+use super::{LockError, shown};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The file or folder could not be read.
-    #[error("{}: {}", .path.display(), read_advice(.source))]
+    #[error("{}: {}", shown(.path).display(), read_advice(.source))]
     Read {
         /// What was to be read.
         path: PathBuf,
@@ -14,7 +14,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// The file or folder could not be written.
-    #[error("{}: {}", .path.display(), write_advice(.source))]
+    #[error("{}: {}", shown(.path).display(), write_advice(.source))]
     Write {
         /// What was to be written.
         path: PathBuf,
@@ -22,7 +22,7 @@ pub enum FileError {
         source: io::Error,
     },
     /// The text is not what the format allows.
-    #[error("{}:{line}: {what}", .path.display())]
+    #[error("{}:{line}: {what}", shown(.path).display())]
     Invalid {
         /// The file.
         path: PathBuf,
@@ -32,7 +32,7 @@ pub enum FileError {
         what: String,
     },
     /// The content is not what the file's name promises.
-    #[error("{}: {what}", .path.display())]
+    #[error("{}: {what}", shown(.path).display())]
     Content {
         /// The file.
         path: PathBuf,
@@ -40,7 +40,7 @@ pub enum FileError {
         what: String,
     },
     /// The file is of another version of the format.
-    #[error("{}:{line}: schema {found}, but this version reads schema {supported}; use the weavelight that wrote it", .path.display())]
+    #[error("{}:{line}: schema {found}, but this version reads schema {supported}; use the weavelight that wrote it", shown(.path).display())]
     Schema {
         /// The file.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum FileError {
         supported: i64,
     },
     /// A number about to be written is NaN or infinite.
-    #[error("{}: `{key}` is not a finite number and was not written; this is a fault of the computation before it", .path.display())]
+    #[error("{}: `{key}` is not a finite number and was not written; this is a fault of the computation before it", shown(.path).display())]
     NotFinite {
         /// The file.
         path: PathBuf,
@@ -60,7 +60,7 @@ pub enum FileError {
         key: String,
     },
     /// Something about to be written does not fit the format.
-    #[error("{}: cannot be written: {what}", .path.display())]
+    #[error("{}: cannot be written: {what}", shown(.path).display())]
     Unwritable {
         /// The file.
         path: PathBuf,
@@ -68,12 +68,18 @@ pub enum FileError {
         what: String,
     },
     /// The output folder holds something that is not ours to replace.
-    #[error("{}: {what}; choose an empty or new folder with --out", .path.display())]
+    #[error("{}: {what}; move that elsewhere, or choose an empty or new folder with --out", shown(.path).display())]
     Occupied {
         /// The folder.
         path: PathBuf,
         /// What is in the way, and why it stays.
         what: String,
+    },
+    /// A file that would be replaced is not what the program wrote there.
+    #[error("{}: is not as weavelight wrote it, and would be lost; move it elsewhere, or choose another --out", shown(.path).display())]
+    NotOurs {
+        /// The file.
+        path: PathBuf,
     },
     /// Another process writes there.
     #[error(transparent)]
@@ -113,6 +119,9 @@ fn write_advice(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
             "no space left on this disk; free some or choose another --out".to_owned()
+        }
+        io::ErrorKind::FileTooLarge => {
+            "the file would be larger than its disk or a limit allows (see ulimit -f); raise the limit or choose another --out".to_owned()
         }
         io::ErrorKind::ReadOnlyFilesystem => {
             "the disk is read-only; choose another --out".to_owned()

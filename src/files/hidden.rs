@@ -3,6 +3,8 @@ use std::ffi::{OsStr, OsString};
 
 /// Longest file name of common file systems, bytes.
 const LONGEST: usize = 255;
+/// Between the name of an output and what makes the name of the folder under construction its own.
+pub(super) const PARTIAL: &str = ".partial-";
 /// What `tempfile` appends.
 pub(super) const RANDOM: usize = 6;
 

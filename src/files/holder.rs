@@ -34,7 +34,11 @@ impl Holder {
 
     /// `None` where the file is not there or half written.
     pub(super) fn read(lock_file: &Path) -> Option<Self> {
-        toml::from_str(&std::fs::read_to_string(lock_file).ok()?).ok()
+        Self::parse(&std::fs::read_to_string(lock_file).ok()?)
+    }
+
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        toml::from_str(text).ok()
     }
 
     /// A process that has not recorded itself yet.

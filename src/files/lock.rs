@@ -14,15 +14,15 @@ use std::time::Duration;
 const LOCK_FILE: &str = ".weavelight-lock";
 /// A look by [`Lock::holder`] holds a lock for a moment; that must not look like an owner.
 const TRIES: usize = 5;
+const MOST_TRIES: usize = 50;
 const BETWEEN_TRIES: Duration = Duration::from_millis(20);
 
 /// The right to write to one place, held until dropped or until the process ends, however it ends.
 ///
-/// The command line and the window take it for every place that they write to over more than a moment:
-/// a capture session's folder ([`Lock::acquire`] with the folder), a rig (with the path of `rig.toml`; held by
-/// [`crate::device::scan::Instruments`]), a calibration folder. [`super::StagedFolder`] and
-/// [`crate::session::SessionWriter`] take their own: do not take it around them, because a second lock of one process on one
-/// place is refused as that of any other process.
+/// Already locked by what works there, for as long as it works: a capture session by [`crate::device::scan::scan`] and
+/// [`crate::solve::make_mask`], a rig by [`crate::device::scan::Instruments`], an output by [`super::StagedFolder`], a calibration
+/// folder by `calibrate`. Do not take the same lock around these: a second lock of one process on one place is refused as
+/// that of any other process.
 ///
 /// A window calls [`Lock::holder`] when it opens a capture session or a calibration: if there is one, it shows the content
 /// read-only with the holder's sentence, and looks again from time to time. Before it changes anything (a mask, a name) it
@@ -72,6 +72,7 @@ impl Lock {
     pub fn acquire(path: &Path, purpose: &str) -> Result<Self, LockError> {
         if path.is_dir() {
             let folder = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+            check_free(path, &file_beside(path))?;
             Self::take(path, &folder.join(LOCK_FILE), purpose)
         } else {
             Self::beside(path, purpose)
@@ -102,14 +103,16 @@ impl Lock {
                     opened.record(&Holder::this_process(purpose));
                     return Ok(Self { held: Some(opened) });
                 }
-                Err(()) if tries < TRIES => {
-                    tries += 1;
-                    std::thread::sleep(BETWEEN_TRIES);
-                }
                 Err(()) => {
-                    let holder = Holder::read(&opened.path);
-                    let (path, lock_file) = (path.to_owned(), opened.path.clone());
-                    return Err(LockError { path, holder, lock_file });
+                    tries += 1;
+                    let holder = opened.holder();
+                    // One that has just begun has not said who it is, and one that ends has taken its file away.
+                    let passing = holder.is_none() || !opened.is_at_its_path();
+                    if tries > MOST_TRIES || (tries > TRIES && !passing) {
+                        let (path, lock_file) = (path.to_owned(), opened.path.clone());
+                        return Err(LockError { path, holder, lock_file });
+                    }
+                    std::thread::sleep(BETWEEN_TRIES);
                 }
             }
         }
@@ -130,10 +133,18 @@ fn lock(opened: &Opened) -> Result<(), ()> {
         Ok(()) => Ok(()),
         Err(TryLockError::WouldBlock) => Err(()),
         // A file system without locks: the record is all there is.
-        Err(TryLockError::Error(_)) => match Holder::read(&opened.path) {
+        Err(TryLockError::Error(_)) => match opened.holder() {
             Some(holder) if holder.may_live() => Err(()),
             _ => Ok(()),
         },
+    }
+}
+
+/// That nobody holds the lock of this file, which is about `path`.
+pub(super) fn check_free(path: &Path, lock_file: &Path) -> Result<(), LockError> {
+    match lock_file::held_by(lock_file) {
+        None => Ok(()),
+        holder => Err(LockError { path: path.to_owned(), holder, lock_file: lock_file.to_owned() }),
     }
 }
 
@@ -174,7 +185,11 @@ mod tests {
             assert_eq!(error.holder.as_ref(), Some(&holder));
             assert_eq!((holder.pid, &*holder.purpose), (std::process::id(), "scan"));
             let said = error.to_string();
-            let who = format!("{}: in use by {} (scan, process ", path.display(), holder.program);
+            let who = format!(
+                "{}: in use by {} (this program: scan, process ",
+                path.display(),
+                holder.program
+            );
             assert!(said.starts_with(&who), "{said}");
             assert!(said.ends_with("; wait until that is done, or stop it"), "{said}");
             drop(lock);

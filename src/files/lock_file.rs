@@ -3,7 +3,7 @@
 use super::holder::Holder;
 use super::sha256_hex;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Seek, Write};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// An open lock file, locked or not.
@@ -52,7 +52,9 @@ pub(super) fn held_by(path: &Path) -> Option<Holder> {
 }
 
 fn is_refusal(error: &io::Error) -> bool {
-    matches!(error.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)
+    use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
+    // A folder that is not there yet: what will be in it is locked all the same.
+    matches!(error.kind(), NotFound | PermissionDenied | ReadOnlyFilesystem)
 }
 
 fn elsewhere(path: &Path) -> PathBuf {
@@ -67,6 +69,13 @@ impl Opened {
             (Ok(ours), Ok(there)) => same_file(&ours, &there),
             _ => false,
         }
+    }
+
+    /// Who holds it, by the file that was opened: it may not be at its path any more.
+    pub(super) fn holder(&self) -> Option<Holder> {
+        let (mut file, mut text) = (&self.file, String::new());
+        file.rewind().and_then(|()| file.read_to_string(&mut text)).ok()?;
+        Holder::parse(&text)
     }
 
     /// Says who holds it. What cannot be written is missed in messages only.

@@ -5,27 +5,45 @@ mod atomic;
 mod disk;
 mod document;
 mod error;
+mod exchange;
+mod file_list;
 mod hash;
 mod hidden;
 mod holder;
 mod inside;
+mod leftovers;
 mod lock;
 mod lock_file;
+mod owned;
 mod provenance;
+mod shown;
+mod signals;
 mod staged;
+mod survey;
 mod write_toml;
 
-pub use atomic::{parent_of, write_atomic};
+pub use atomic::{clean_temporary, parent_of, write_atomic};
 pub use disk::free_bytes;
 pub use document::Document;
 pub use error::FileError;
+pub use exchange::exchange;
+pub use file_list::LIST_FILE;
 pub use hash::{sha256_hex, sha256_of_file};
 pub use holder::Holder;
 pub use inside::inside_folder;
+pub use leftovers::UNFINISHED;
 pub use lock::{Lock, LockError};
+pub use owned::{
+    Owned, begin_owned, check_owned, note_files, remove_noted, remove_owned, update_owned_toml,
+    write_owned, write_owned_toml,
+};
 pub use provenance::{Input, Provenance, ProvenanceTable};
+pub use shown::{WORK_FOLDER, shown};
+pub use signals::survive_size_limits;
 pub use staged::{OutputKind, StagedFolder};
-pub use write_toml::{DateTimeError, datetime_from_timestamp, timestamp_from_datetime, write_toml};
+pub use write_toml::{
+    DateTimeError, datetime_from_timestamp, timestamp_from_datetime, toml_bytes, write_toml,
+};
 
 /// The schema number that this version writes and reads, for every format.
 pub const SCHEMA: i64 = 1;

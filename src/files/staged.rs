@@ -1,59 +1,76 @@
 use super::FileError;
 use super::atomic::{parent_of, sync_folder};
+use super::exchange::exchange;
+use super::file_list::{FileList, LIST_FILE};
+use super::hidden::{PARTIAL, hidden_name};
+use super::leftovers::{self, UNFINISHED};
+use super::lock::Lock;
+use super::survey::Survey;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What kind of folder is written: tells an earlier output, which may be replaced, from a folder that is somebody's.
+/// What kind of folder is written: tells an earlier output, which may be replaced, from another kind.
 #[derive(Clone, Copy, Debug)]
 pub struct OutputKind {
     /// As in "solution", for messages.
     pub name: &'static str,
     /// A file that every finished output of this kind has. `None`: such a folder is never replaced.
     pub marker: Option<&'static str>,
-    /// Every name that may stand in such a folder; a `*` at the end stands for any ending. A folder that holds anything
-    /// else is not replaced, lest a user's own files go with it.
-    pub members: &'static [&'static str],
-}
-
-impl OutputKind {
-    fn owns(&self, name: &str) -> bool {
-        self.members.iter().any(|member| match member.strip_suffix('*') {
-            Some(start) => name.starts_with(start),
-            None => name == *member,
-        })
-    }
 }
 
 /// An output folder under construction beside its final place. [`StagedFolder::commit`] moves it there; dropping it
-/// removes it. A crash leaves at most `.NAME.partial-xxxx`, never anything under the final name.
+/// removes it. A crash leaves at most `.NAME.partial-xxxxxx`, which the next run beside it takes away, and never anything
+/// unfinished under the final name.
+///
+/// A finished output holds [`LIST_FILE`] with the name and hash of every file, those in its folders included. An earlier output
+/// is replaced only if every file in it is listed and has its hash. A file, folder or link that was added, and a file that was
+/// changed, is named in an error, before the work and again at its end. An output inside another one (a solution in a
+/// simulation's folder) is something added: the outer one is not replaced as long as it stands there. A folder without a list
+/// was written by an earlier version or by somebody else, and is not replaced.
+///
+/// The place is locked from [`StagedFolder::create`] on, so that two processes cannot write one output.
 #[derive(Debug)]
 pub struct StagedFolder {
     partial: Option<tempfile::TempDir>,
     target: PathBuf,
     kind: OutputKind,
+    /// What stood at the target at first.
+    before: Option<Survey>,
     /// Parents that did not exist before, outermost first; removed again if nothing comes of it.
     made_parents: Vec<PathBuf>,
+    lock: Option<Lock>,
 }
 
 impl StagedFolder {
     /// Starts an output that will stand at `target`.
     ///
     /// # Errors
-    /// Where `target` is a file, or a folder that is neither empty nor an earlier output of this kind, or where nothing
-    /// can be written beside it.
+    /// Where `target` is a file, or a folder that is neither empty nor an earlier output of this kind as it was written, or
+    /// another process writes it, or nothing can be written beside it.
     pub fn create(target: &Path, kind: OutputKind) -> Result<Self, FileError> {
         let target = absolute(target)?;
-        check_free(&target, kind)?;
+        // Before anything is made or read: what stands in the way by its name alone.
+        check_no_file(&target)?;
         let parent = parent_of(&target).to_owned();
         check_one_disk(&target, &parent)?;
         let made_parents = make_parents(&parent)?;
-        let prefix =
-            format!(".{}.partial-", target.file_name().unwrap_or_default().to_string_lossy());
-        let mut staged = Self { partial: None, target, kind, made_parents };
-        let partial = folder_builder(&prefix).tempdir_in(&parent);
-        staged.partial = Some(partial.map_err(|source| FileError::write(&staged.target, source))?);
+        let (partial, before, lock) = (None, None, None);
+        let mut staged = Self { partial, target, kind, before, made_parents, lock };
+        staged.lock = Some(Lock::beside(&staged.target, kind.name)?);
+        leftovers::clean(&staged.target);
+        staged.before = check_free(&staged.target, kind, None)?;
+        staged.partial = Some(staged.begin(&parent)?);
         Ok(staged)
+    }
+
+    fn begin(&self, parent: &Path) -> Result<tempfile::TempDir, FileError> {
+        let failed = |source| FileError::write(&self.target, source);
+        let name = self.target.file_name().unwrap_or_default();
+        let prefix = hidden_name(name, PARTIAL);
+        let partial = folder_builder(&prefix).tempdir_in(parent).map_err(failed)?;
+        fs::write(partial.path().join(UNFINISHED), name.as_encoded_bytes()).map_err(failed)?;
+        Ok(partial)
     }
 
     /// Where to write meanwhile.
@@ -71,50 +88,62 @@ impl StagedFolder {
         self.path().join(name)
     }
 
-    /// Moves the whole folder to its final place. An earlier output stands untouched until this moment.
+    /// Moves the whole folder to its final place, with the list of its files. An earlier output stands untouched until this
+    /// moment.
     ///
     /// # Errors
     /// Where the place was taken meanwhile, or the data cannot be flushed or renamed.
     pub fn commit(mut self) -> Result<(), FileError> {
         let failed = |source| FileError::write(&self.target, source);
-        sync_tree(self.path()).map_err(failed)?;
-        check_free(&self.target, self.kind)?;
-        let old = self.set_old_aside()?;
-        if let Err(source) = fs::rename(self.path(), &self.target) {
-            if let Some(old) = &old {
-                let _ = fs::rename(old, &self.target);
-            }
-            return Err(failed(source));
+        // Hashing needs the processor and flushing the disk.
+        let (flushed, list) = rayon::join(
+            || sync_tree(self.path()),
+            || FileList::of(self.path(), &[LIST_FILE, UNFINISHED]),
+        );
+        flushed.map_err(failed)?;
+        list?.write(self.path())?;
+        fs::remove_file(self.join(UNFINISHED)).map_err(failed)?;
+        sync_folder(self.path());
+        let before = check_free(&self.target, self.kind, self.before.as_ref())?;
+        match before {
+            None => fs::rename(self.path(), &self.target).map_err(failed)?,
+            Some(before) => self.replace(&before)?,
         }
         if let Some(partial) = self.partial.take() {
             let _ = partial.keep();
         }
         sync_folder(parent_of(&self.target));
-        if let Some(old) = old {
-            // The new output is in place; what cannot be removed is only litter.
-            let _ = fs::remove_dir_all(old);
-        }
         self.made_parents.clear();
         Ok(())
     }
 
-    /// Renames what stands at the target, if anything, and says where to.
-    fn set_old_aside(&self) -> Result<Option<PathBuf>, FileError> {
-        if !self.target.exists() {
-            return Ok(None);
+    /// Takes the place of the earlier output and deletes that.
+    fn replace(&self, before: &Survey) -> Result<(), FileError> {
+        let failed = |source| FileError::write(&self.target, source);
+        exchange(self.path(), &self.target).map_err(failed)?;
+        sync_folder(parent_of(&self.target));
+        // Nothing is added under this name any more: what came since the last look is found now.
+        let now = Survey::of(self.path(), Some(before));
+        let found = match &now {
+            Ok(now) => now.as_ref().and_then(Survey::in_the_way),
+            Err(_) => Some("something that cannot be read".to_owned()),
+        };
+        if let Some(what) = found {
+            exchange(self.path(), &self.target).map_err(failed)?;
+            return Err(holds(&self.target, &what, self.kind));
         }
-        let mut name = self.path().file_name().unwrap_or_default().to_owned();
-        name.push(".old");
-        let aside = self.target.with_file_name(name);
-        fs::rename(&self.target, &aside)
-            .map_err(|source| FileError::write(&self.target, source))?;
-        Ok(Some(aside))
+        if let Ok(Some(now)) = now {
+            // The new output is in place; what cannot be removed is litter, and tried again by the next run.
+            now.delete(self.path());
+        }
+        Ok(())
     }
 }
 
 impl Drop for StagedFolder {
     fn drop(&mut self) {
         drop(self.partial.take());
+        drop(self.lock.take());
         for parent in self.made_parents.iter().rev() {
             // Fails where something else stands in it by now: then it stays.
             let _ = fs::remove_dir(parent);
@@ -132,34 +161,55 @@ fn absolute(target: &Path) -> Result<PathBuf, FileError> {
     }
 }
 
-fn check_free(target: &Path, kind: OutputKind) -> Result<(), FileError> {
-    let entries = match fs::read_dir(target) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(error) if error.kind() == io::ErrorKind::NotADirectory && target.is_file() => {
-            return Err(occupied(target, "is a file".to_owned()));
+fn check_no_file(target: &Path) -> Result<(), FileError> {
+    match fs::symlink_metadata(target) {
+        Ok(found) if found.is_symlink() => {
+            Err(occupied(target, "is a link to something that is not there".to_owned()))
         }
-        Err(error) => return Err(FileError::write(target, error)),
-    };
-    let names: Vec<String> = entries
-        .filter_map(Result::ok)
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .collect();
-    let finished = kind.marker.is_some_and(|marker| names.iter().any(|name| name == marker));
-    let foreign = names.iter().filter(|name| !finished || !kind.owns(name)).min();
-    match (foreign, kind.marker) {
-        (None, _) => Ok(()),
-        (Some(name), Some(_)) => {
-            let what = format!(
-                "holds {name}; only an earlier {} and nothing else would be replaced",
-                kind.name
-            );
-            Err(occupied(target, what))
+        Ok(found) if !found.is_dir() => Err(occupied(target, "is a file".to_owned())),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+            Err(FileError::write(target, error))
         }
-        (Some(name), None) => {
-            Err(occupied(target, format!("holds {name}; a {} is never replaced", kind.name)))
-        }
+        _ => Ok(()),
     }
+}
+
+/// What stands at the target, if anything: all of it may be deleted.
+fn check_free(
+    target: &Path,
+    kind: OutputKind,
+    before: Option<&Survey>,
+) -> Result<Option<Survey>, FileError> {
+    check_no_file(target)?;
+    let Some(survey) = Survey::of(target, before)? else { return Ok(None) };
+    if survey.is_empty() {
+        return Ok(Some(survey));
+    }
+    let Some(marker) = kind.marker else {
+        let first = survey.any_name().unwrap_or_default();
+        return Err(occupied(target, format!("holds {first}; a {} is never replaced", kind.name)));
+    };
+    if !survey.is_listed {
+        let first = survey.any_name().unwrap_or_default();
+        let what = format!(
+            "holds {first} and no {LIST_FILE} that says it is weavelight's; only an earlier {} and nothing else would be replaced",
+            kind.name
+        );
+        return Err(occupied(target, what));
+    }
+    if let Some(what) = survey.in_the_way() {
+        return Err(holds(target, &what, kind));
+    }
+    if !survey.has(marker) {
+        let first = survey.any_name().unwrap_or_default();
+        return Err(holds(target, &first, kind));
+    }
+    Ok(Some(survey))
+}
+
+fn holds(target: &Path, what: &str, kind: OutputKind) -> FileError {
+    let rule = format!("only an earlier {} and nothing else would be replaced", kind.name);
+    occupied(target, format!("holds {what}; {rule}"))
 }
 
 /// A folder cannot be renamed onto the root of another disk; said before the work, not after it.
@@ -191,7 +241,7 @@ fn make_parents(parent: &Path) -> Result<Vec<PathBuf>, FileError> {
 
 /// Temporary folders are private by default; what is renamed into place gets the permissions any new folder gets.
 #[cfg(unix)]
-fn folder_builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
+fn folder_builder(prefix: &std::ffi::OsStr) -> tempfile::Builder<'_, 'static> {
     use std::os::unix::fs::PermissionsExt;
     let mut builder = tempfile::Builder::new();
     builder.prefix(prefix).permissions(fs::Permissions::from_mode(0o777));
@@ -199,7 +249,7 @@ fn folder_builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
 }
 
 #[cfg(not(unix))]
-fn folder_builder(prefix: &str) -> tempfile::Builder<'_, 'static> {
+fn folder_builder(prefix: &std::ffi::OsStr) -> tempfile::Builder<'_, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(prefix);
     builder
@@ -220,79 +270,5 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const KIND: OutputKind = OutputKind {
-        name: "solution",
-        marker: Some("report.json"),
-        members: &["report.json", "tilt-*", "a"],
-    };
-
-    fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> = fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        names.sort();
-        names
-    }
-
-    /// What happens to a target that holds `present` when `report.json` is staged and committed.
-    fn check(present: &[&str], expected: &str) {
-        let home = tempfile::tempdir().unwrap();
-        let target = home.path().join("out");
-        if !present.is_empty() {
-            fs::create_dir(&target).unwrap();
-        }
-        for name in present.iter().filter(|name| **name != "/") {
-            fs::write(target.join(name), "old").unwrap();
-        }
-        let found = match StagedFolder::create(&target, KIND) {
-            Ok(staged) => {
-                fs::write(staged.join("report.json"), "new").unwrap();
-                staged.commit().unwrap();
-                names(&target).join(" ")
-            }
-            Err(error) => error.to_string(),
-        };
-        assert!(found.contains(expected), "{present:?}: {found}");
-        assert_eq!(names(home.path()), ["out"], "{present:?}");
-    }
-
-    #[test]
-    fn only_empty_folders_and_earlier_outputs_are_replaced() {
-        check(&[], "report.json");
-        check(&["/"], "report.json");
-        check(&["report.json", "tilt-3", "a"], "report.json");
-        check(
-            &["report.json", "thesis.tex"],
-            "holds thesis.tex; only an earlier solution and nothing else",
-        );
-        check(&["a"], "holds a; only an earlier solution");
-    }
-
-    #[test]
-    fn dropping_leaves_the_old_output_and_no_new_parents() {
-        let home = tempfile::tempdir().unwrap();
-        let target = home.path().join("out");
-        fs::create_dir(&target).unwrap();
-        fs::write(target.join("report.json"), "old").unwrap();
-        let staged = StagedFolder::create(&target, KIND).unwrap();
-        fs::write(staged.join("report.json"), "new").unwrap();
-        drop(staged);
-        assert_eq!(fs::read_to_string(target.join("report.json")).unwrap(), "old");
-        drop(StagedFolder::create(&home.path().join("x/y/z"), KIND).unwrap());
-        assert_eq!(names(home.path()), ["out"]);
-    }
-
-    #[test]
-    fn a_file_in_the_way_is_named() {
-        let home = tempfile::tempdir().unwrap();
-        let target = home.path().join("out");
-        fs::write(&target, "mine").unwrap();
-        let error = StagedFolder::create(&target, KIND).unwrap_err().to_string();
-        assert!(error.contains("out: is a file; choose"), "{error}");
-        assert_eq!(fs::read_to_string(target).unwrap(), "mine");
-    }
-}
+#[path = "staged_tests.rs"]
+mod tests;

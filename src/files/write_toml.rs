@@ -7,8 +7,16 @@ use toml::value::Datetime;
 /// Writes a value as TOML, whole or not at all.
 ///
 /// # Errors
-/// A number that is not finite (the reader would refuse the file), or what [`write_atomic`] reports.
+/// As [`toml_bytes`], or what [`write_atomic`] reports.
 pub fn write_toml<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
+    write_atomic(path, &toml_bytes(path, value)?)
+}
+
+/// A value as TOML, to be written to `path`.
+///
+/// # Errors
+/// A number that is not finite: the reader would refuse the file.
+pub fn toml_bytes<T: Serialize>(path: &Path, value: &T) -> Result<Vec<u8>, FileError> {
     let unwritable = |error: toml::ser::Error| FileError::Unwritable {
         path: path.to_owned(),
         what: error.to_string(),
@@ -17,7 +25,7 @@ pub fn write_toml<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError>
     if let Some(key) = not_finite("", &tree) {
         return Err(FileError::NotFinite { path: path.to_owned(), key });
     }
-    write_atomic(path, toml::to_string(value).map_err(unwritable)?.as_bytes())
+    Ok(toml::to_string(value).map_err(unwritable)?.into_bytes())
 }
 
 /// The key of the first number that is NaN or infinite.

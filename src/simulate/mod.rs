@@ -21,25 +21,12 @@ pub use options::{Flaws, Material, Options, Part, Targets};
 pub use scene::{SCENE_FILE, Scene};
 pub use table::{Laid, Lying, lay};
 
-use crate::files::{FileError, OutputKind, StagedFolder};
+use crate::files::{FileError, OutputKind, StagedFolder, check_owned};
 use parts::Studio;
 use std::path::PathBuf;
 
 /// A folder that `simulate` writes, and may replace.
-const OUTPUT: OutputKind = OutputKind {
-    name: "simulation",
-    marker: Some("rig.toml"),
-    members: &[
-        "rig.toml",
-        SCENE_FILE,
-        "calibration",
-        "board",
-        "grey",
-        "white-*",
-        "swatch",
-        "truth",
-    ],
-};
+const OUTPUT: OutputKind = OutputKind { name: "simulation", marker: Some("rig.toml") };
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
@@ -97,11 +84,14 @@ pub fn run(
 /// looks at, into the folder `options.out` (made where absent; what else is in it stays).
 ///
 /// # Errors
-/// As [`run`].
+/// As [`run`], or where one of the two stands there already.
 pub fn write_rig(options: &Options) -> Result<(), SimulateError> {
     options.check()?;
     let folder = &options.out;
     std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    for name in ["rig.toml", SCENE_FILE] {
+        check_owned(&folder.join(name))?;
+    }
     Instrument::from_options(options)?.write_rig(options, folder)
 }
 

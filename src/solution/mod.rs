@@ -29,22 +29,7 @@ pub const REPORT_HTML: &str = "report.html";
 pub const CAMERA_TOML: &str = crate::instrument::CAMERA_FILE;
 
 /// A solution as an output folder: an earlier one may be replaced if it holds nothing else.
-pub const OUTPUT: OutputKind = OutputKind {
-    name: "solution",
-    marker: Some(REPORT_JSON),
-    members: &[
-        NORMAL_EXR,
-        ALBEDO_EXR,
-        CONFIDENCE_EXR,
-        NORMAL_PNG,
-        ALBEDO_PNG,
-        MASK_PNG,
-        REPORT_JSON,
-        REPORT_HTML,
-        CAMERA_TOML,
-        "residual-*",
-    ],
-};
+pub const OUTPUT: OutputKind = OutputKind { name: "solution", marker: Some(REPORT_JSON) };
 
 /// Name of the file with what the fit leaves over of a light: channel Y, 32-bit float, in units of the albedo, as a fraction
 /// of what a perfect white diffuser facing the light sends back; highlights positive, cast shadows negative; 0 where

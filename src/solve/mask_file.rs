@@ -4,7 +4,7 @@ use super::load::{load, read_mask};
 use super::options::{MaskChoice, Options, Reuse};
 use super::swatch::{Swatch, find_swatch};
 use super::{Progress, SolveError, leave_out_what_adds_nothing};
-use crate::files::{FileError, Lock, parent_of, write_atomic};
+use crate::files::{FileError, Lock, clean_temporary, parent_of, write_atomic};
 use crate::instrument::Calibration;
 use crate::raster::encode_png_grey8;
 use crate::session::Session;
@@ -83,6 +83,9 @@ fn lock(session: &Path, path: &Path) -> Result<[Option<Lock>; 2], FileError> {
         _ => false,
     };
     let whole = inside.then(|| Lock::acquire(session, "mask")).transpose()?;
+    if inside {
+        clean_temporary(session);
+    }
     let alone = (!inside).then(|| Lock::beside(path, "mask")).transpose()?;
     Ok([whole, alone])
 }

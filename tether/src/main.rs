@@ -24,6 +24,7 @@ use weavelight::device::camera::tethered::protocol::{
 const GRACE: Duration = Duration::from_secs(2);
 
 fn main() -> ExitCode {
+    weavelight::files::survive_size_limits();
     recent::listen();
     let context = match gphoto2::Context::new() {
         Ok(context) => context,

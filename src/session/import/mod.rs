@@ -26,7 +26,7 @@ use weavelight_calibration::description::{DirectionalLight, Light};
 pub const CALIBRATION: &str = "calibration";
 
 /// A capture session as an output folder: pictures are precious, so one is never replaced.
-const OUTPUT: OutputKind = OutputKind { name: "capture session", marker: None, members: &[] };
+const OUTPUT: OutputKind = OutputKind { name: "capture session", marker: None };
 
 /// What to import.
 #[derive(Clone, Debug)]
@@ -214,8 +214,9 @@ struct Names(HashSet<String>);
 impl Names {
     fn free(&mut self, wanted: &str) -> String {
         let numbered = |k: usize| if k == 0 { wanted.to_owned() } else { format!("{k}-{wanted}") };
-        let taken =
-            |name: &String| self.0.contains(name) || name == super::MANIFEST || name == CALIBRATION;
+        let ours = |name: &str| name == super::MANIFEST || name == CALIBRATION;
+        let hidden = |name: &str| name.starts_with(".weavelight-");
+        let taken = |name: &String| self.0.contains(name) || ours(name) || hidden(name);
         let name = (0..).map(numbered).find(|name| !taken(name)).unwrap_or_default();
         self.0.insert(name.clone());
         name

@@ -61,7 +61,7 @@ impl Folders {
                 )
             })
             // Seconds differ from run to run.
-            .filter(|(name, _)| name != solution::REPORT_JSON)
+            .filter(|(name, _)| name != solution::REPORT_JSON && name != crate::files::LIST_FILE)
             .collect()
     }
 }
