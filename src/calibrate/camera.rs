@@ -3,8 +3,8 @@
 use super::boards::{self, Corners, shape_of};
 use super::frames::{check_size, grey_picture};
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::Provenance;
-use crate::instrument::{MeasuredCamera, Optics, Rig, write_camera};
+use crate::files::{Provenance, begin_owned};
+use crate::instrument::{CAMERA_FILE, MeasuredCamera, Optics, Rig, write_camera};
 use crate::session::{Board, FrameEntry, Kind, Session};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -86,6 +86,7 @@ pub fn camera(
     progress: &Progress,
 ) -> Result<CameraReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    let _lock = begin_owned(&options.out, "calibrate camera", &[CAMERA_FILE])?;
     let sessions: Vec<Session> =
         options.sessions.iter().map(|path| Session::load(path)).collect::<Result<_, _>>()?;
     let board = common_board(&sessions)?;

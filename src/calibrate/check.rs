@@ -4,7 +4,7 @@
 
 use super::sheet::{Known, observe, tilt_and_height};
 use super::{CalibrateError, Progress};
-use crate::files::FileError;
+use crate::files::{FileError, begin_owned, write_owned};
 use crate::instrument::Calibration;
 use crate::session::Session;
 use nalgebra::{Matrix3, Vector3};
@@ -88,6 +88,8 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
         defects: &calibration.defects,
         lights: calibration.lights.len(),
     };
+    let _lock =
+        options.out.as_ref().map(|out| begin_owned(out, "calibrate check", &[])).transpose()?;
     let mut report = CheckReport {
         passed: true,
         threshold_deg: options.threshold_deg,
@@ -278,5 +280,5 @@ fn write_png(path: &Path, image: &Image<[u8; 3]>) -> Result<(), FileError> {
     let mut writer = encoder.write_header().map_err(failed)?;
     writer.write_image_data(&image.data.concat()).map_err(failed)?;
     writer.finish().map_err(failed)?;
-    crate::files::write_atomic(path, &bytes)
+    write_owned(path, &bytes)
 }

@@ -5,10 +5,10 @@ use super::lights::nominal_camera;
 use super::patches::{ChartFrame, ChartFrames, read_chart};
 use super::sheet::optics_warnings;
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::Provenance;
+use crate::files::{Provenance, begin_owned};
 use crate::instrument::{
-    CAMERA_FILE, COLOR_FILE, Calibration, Color, Defects, Noise, Optics, Rig, RigLightPlace,
-    write_color, write_defects,
+    CAMERA_FILE, COLOR_FILE, Calibration, Color, DEFECTS_FILE, Defects, Noise, Optics, Rig,
+    RigLightPlace, write_color, write_defects,
 };
 use crate::session::{Kind, Patch, Session};
 use nalgebra::{Matrix3, Vector3};
@@ -83,6 +83,7 @@ struct Chart {
 /// Where frames cannot be read, the chart is not where the capture session says, or files cannot be written.
 pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    let _lock = begin_owned(&options.out, "calibrate color", &[COLOR_FILE, DEFECTS_FILE])?;
     let chart = load(options, &rig, progress)?;
     let before = before(&options.out)?;
     let mut warnings = other_optics(&chart, before.as_ref());

@@ -2,9 +2,10 @@
 
 use super::sheet::{Known, Observed, observe, tilt_and_height};
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::{Input, Provenance, sha256_of_file};
+use crate::files::{Input, Provenance, begin_owned, sha256_of_file};
 use crate::instrument::{
-    CAMERA_FILE, CalibratedLight, Calibration, Noise, Rig, RigLightPlace, write_color, write_lights,
+    CAMERA_FILE, CalibratedLight, Calibration, LIGHTS_FILE, Noise, Rig, RigLightPlace,
+    update_color, write_lights,
 };
 use crate::session::Session;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -109,6 +110,7 @@ pub fn lights(
     progress: &Progress,
 ) -> Result<LightsReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    let _lock = begin_owned(&options.out, "calibrate lights", &[LIGHTS_FILE])?;
     let calibration = with_camera(&options.out)?;
     let Some(camera) = &calibration.camera else { return Err(no_camera(&options.out)) };
     let known = Known {
@@ -373,7 +375,7 @@ fn note_kappa(out: &Path, calibration: &Calibration, kappa: f64) -> Result<(), C
         noise: Some(Noise { kappa, ..noise }),
         ..calibration.color.clone()
     };
-    write_color(out, &color, provenance)?;
+    update_color(out, &color, provenance)?;
     Ok(())
 }
 

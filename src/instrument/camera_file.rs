@@ -2,7 +2,7 @@
 
 use super::Optics;
 use super::rig_file::{check_positive, check_size};
-use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_owned_toml};
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -82,7 +82,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
 /// Writes `camera.toml` into a calibration folder, which is made where absent.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// Where it cannot be written, or a `camera.toml` stands there that is not as the program wrote it.
 pub fn write_camera(
     folder: &Path,
     measured: &MeasuredCamera,
@@ -109,7 +109,7 @@ pub fn write_camera(
         focal_length_mm: optics.focal_length_mm,
         provenance: provenance.into(),
     };
-    write_toml(&folder.join(CAMERA_FILE), &file)
+    write_owned_toml(&folder.join(CAMERA_FILE), &file)
 }
 
 fn camera_from_file(document: &Document, file: &CameraFile) -> Result<Camera, FileError> {

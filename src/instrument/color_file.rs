@@ -2,7 +2,9 @@
 
 use super::rig_file::check_positive;
 use super::{Color, Noise};
-use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
+use crate::files::{
+    Document, FileError, Provenance, ProvenanceTable, SCHEMA, update_owned_toml, write_owned_toml,
+};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -80,15 +82,31 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Color, Provenance)>, FileErr
 /// Writes `color.toml` into a calibration folder, which is made where absent.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// Where it cannot be written, or a `color.toml` stands there that is not as the program wrote it.
 pub fn write_color(folder: &Path, color: &Color, provenance: &Provenance) -> Result<(), FileError> {
     std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
+    write_owned_toml(&folder.join(COLOR_FILE), &file_of(color, provenance))
+}
+
+/// As [`write_color`], with what `color.toml` said but for what was measured since: it may have been edited.
+///
+/// # Errors
+/// Where it cannot be written.
+pub fn update_color(
+    folder: &Path,
+    color: &Color,
+    provenance: &Provenance,
+) -> Result<(), FileError> {
+    update_owned_toml(&folder.join(COLOR_FILE), &file_of(color, provenance))
+}
+
+fn file_of(color: &Color, provenance: &Provenance) -> ColorFile {
     let noise = |n: Noise| NoiseTable {
         electrons_per_dn: n.electrons_per_dn,
         read_noise_e: n.read_noise_e,
         kappa: n.kappa,
     };
-    let file = ColorFile {
+    ColorFile {
         schema: SCHEMA,
         black_level: color.black_level,
         saturation_level: color.saturation_level,
@@ -101,8 +119,7 @@ pub fn write_color(folder: &Path, color: &Color, provenance: &Provenance) -> Res
             .iter()
             .map(|gains| LightTable { white_balance: *gains })
             .collect(),
-    };
-    write_toml(&folder.join(COLOR_FILE), &file)
+    }
 }
 
 fn check(document: &Document, file: &ColorFile) -> Result<(), FileError> {

@@ -1,7 +1,7 @@
 //! `defects.toml`: photosites of the camera that do not measure light.
 
 use super::Defects;
-use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_toml};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_owned_toml};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub(super) fn read(folder: &Path) -> Result<Defects, FileError> {
 /// Writes `defects.toml` into a calibration folder, which is made where absent.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// Where it cannot be written, or a `defects.toml` stands there that is not as the program wrote it.
 pub fn write_defects(
     folder: &Path,
     defects: &Defects,
@@ -47,5 +47,5 @@ pub fn write_defects(
         dead: defects.dead().to_vec(),
         provenance: provenance.into(),
     };
-    write_toml(&folder.join(DEFECTS_FILE), &file)
+    write_owned_toml(&folder.join(DEFECTS_FILE), &file)
 }

@@ -4,8 +4,8 @@ use super::gain_map::{encode_gain_map, read_gain_map};
 use super::rig_file::check_positive;
 use super::{CalibratedLight, LIGHT_COUNT};
 use crate::files::{
-    Document, FileError, Provenance, ProvenanceTable, SCHEMA, inside_folder, sha256_hex,
-    write_atomic, write_toml,
+    Document, FileError, Provenance, ProvenanceTable, SCHEMA, inside_folder, remove_owned,
+    sha256_hex, write_owned, write_owned_toml,
 };
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -80,7 +80,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Vec<CalibratedLight>, Proven
 /// names of their own content, so that until the moment `lights.toml` is replaced the old one finds the old ones.
 ///
 /// # Errors
-/// Where something cannot be written; the old calibration then stands.
+/// Where something cannot be written, or is not as the program wrote it; the old calibration then stands.
 pub fn write_lights(
     folder: &Path,
     lights: &[CalibratedLight],
@@ -93,24 +93,15 @@ pub fn write_lights(
         .map(|(k, light)| table_from_light(folder, k, light))
         .collect::<Result<Vec<_>, _>>()?;
     let used: Vec<String> = tables.iter().filter_map(|table| table.gain_map.clone()).collect();
-    write_toml(
+    write_owned_toml(
         &folder.join(LIGHTS_FILE),
         &LightsFile { schema: SCHEMA, provenance: provenance.into(), lights: tables },
     )?;
-    remove_unused_gain_maps(folder, &used);
-    Ok(())
-}
-
-/// Gain maps of an earlier calibration are only litter: what cannot be removed may stay.
-fn remove_unused_gain_maps(folder: &Path, used: &[String]) {
-    let Ok(entries) = std::fs::read_dir(folder) else { return };
-    for entry in entries.filter_map(Result::ok) {
-        let name = entry.file_name().to_string_lossy().into_owned();
-        let ours = name.starts_with("gain-light-") && name.ends_with(".exr");
-        if ours && !used.contains(&name) {
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
+    // Maps of an earlier calibration; somebody's own stay.
+    remove_owned(folder, |name| {
+        let is_map = name.starts_with("gain-light-") && name.ends_with(".exr");
+        is_map && !used.iter().any(|used| used == name)
+    })
 }
 
 fn light_from_table(
@@ -231,6 +222,6 @@ fn table_from_light(
 fn write_gain_map(folder: &Path, k: usize, map: &Image<[f32; 3]>) -> Result<String, FileError> {
     let bytes = encode_gain_map(folder, k, map)?;
     let name = format!("gain-light-{k:02}-{:.8}.exr", sha256_hex(&bytes));
-    write_atomic(&folder.join(&name), &bytes)?;
+    write_owned(&folder.join(&name), &bytes)?;
     Ok(name)
 }

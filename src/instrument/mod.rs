@@ -14,7 +14,7 @@ mod tests;
 
 pub use calibration::CalibrationProvenance;
 pub use camera_file::{CAMERA_FILE, MeasuredCamera, write_camera};
-pub use color_file::{COLOR_FILE, write_color};
+pub use color_file::{COLOR_FILE, update_color, write_color};
 pub use defects::Defects;
 pub use defects_file::{DEFECTS_FILE, write_defects};
 pub use lights_file::{LIGHTS_FILE, write_lights};
