@@ -1,10 +1,11 @@
 use super::{FrameEntry, MANIFEST, Session, SessionError};
-use crate::files::{FileError, sha256_hex, write_atomic};
+use crate::files::{FileError, note_files, parent_of, sha256_hex, sha256_of_file, write_atomic};
 use std::fs::File;
 use std::path::Path;
 
 /// A capture session that grows frame by frame. After every call the folder is a valid capture session: a crash loses at
-/// most the frame that was being written, and the next run resumes from the manifest.
+/// most the frame that was being written, and the next run resumes from the manifest. The caller holds the folder's
+/// [`crate::files::Lock`].
 #[derive(Debug)]
 pub struct SessionWriter {
     session: Session,
@@ -58,6 +59,8 @@ impl SessionWriter {
 
     /// Takes over a frame's file, which is on the capture session's disk and holds `bytes`: flushed to the disk, renamed, then
     /// recorded with its hash. The frame in the file `replaced` leaves the record in the same moment, and its file after that.
+    /// Both files are noted beside `source` before anything moves, so that after a kill the next run knows which one nobody asks
+    /// for ([`crate::files::remove_noted`]).
     ///
     /// # Errors
     /// Where file or manifest cannot be written, or the entry is impossible; the manifest is then as it was.
@@ -77,18 +80,30 @@ impl SessionWriter {
         let path = grown.frame_path(&entry);
         grown.frames.push(entry);
         grown.check()?;
+        self.note(source, grown.frames.last(), replaced)?;
         // Saving the manifest flushes the folder, and so this.
         std::fs::rename(source, &path).map_err(|error| FileError::write(&path, error))?;
         grown.save()?;
-        self.session = grown;
+        let before = std::mem::replace(&mut self.session, grown);
         if let Some(replaced) = replaced {
-            // Nobody asks for it any more; what cannot be removed is only litter.
-            let _ = std::fs::remove_file(self.session.folder.join(replaced));
+            delete(&before, replaced);
         }
         Ok(())
     }
 
-    /// Takes the frame in `file` out of the record, and then its file away.
+    fn note<'a>(
+        &'a self,
+        source: &Path,
+        new: Option<&'a FrameEntry>,
+        replaced: Option<&Path>,
+    ) -> Result<(), FileError> {
+        let old = self.session.frames.iter().find(|frame| Some(&*frame.file) == replaced);
+        let hashed = |frame: &'a FrameEntry| Some((&*frame.file, frame.sha256.as_deref()?));
+        let files: Vec<(&Path, &str)> = new.into_iter().chain(old).filter_map(hashed).collect();
+        note_files(parent_of(source), &files)
+    }
+
+    /// Takes the frame in `file` out of the record, and then its file away, if that still is what was recorded.
     ///
     /// # Errors
     /// Where the manifest cannot be written; it is then as it was.
@@ -96,8 +111,19 @@ impl SessionWriter {
         let mut rest = self.session.clone();
         rest.frames.retain(|frame| frame.file != file);
         rest.save()?;
-        self.session = rest;
-        let _ = std::fs::remove_file(self.session.folder.join(file));
+        let before = std::mem::replace(&mut self.session, rest);
+        delete(&before, file);
         Ok(())
+    }
+}
+
+/// Deletes a frame's file. One that is not what was recorded may be somebody's work, and stays; what cannot be deleted is
+/// litter.
+fn delete(session: &Session, file: &Path) {
+    let path = session.folder.join(file);
+    let recorded = session.frames.iter().find(|frame| frame.file == file);
+    let recorded = recorded.and_then(|frame| frame.sha256.as_deref());
+    if recorded.is_some() && sha256_of_file(&path).ok().as_deref() == recorded {
+        let _ = std::fs::remove_file(path);
     }
 }

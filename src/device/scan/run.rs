@@ -13,7 +13,7 @@ use super::subject::Subject;
 use super::summary::{Event, Seconds, Summary};
 use crate::device::board::{Board, BoardError, Failure};
 use crate::device::camera::{Camera, CameraError, Cure, Release, Settings};
-use crate::files::FileError;
+use crate::files::{FileError, shown};
 use crate::instrument::Rig;
 use crate::raw;
 use crate::session::{FrameEntry, Session};
@@ -406,7 +406,7 @@ impl Run<'_> {
             }
             (None, _, Some(wanted)) => wanted,
             (None, _, None) => {
-                let file = shot.path.display().to_string();
+                let file = shown(&shot.path).display().to_string();
                 return Err(ScanError::ExposureUnknown { file });
             }
         };

@@ -4,13 +4,13 @@ use super::ScanError;
 use super::plan::{Plan, Step};
 use super::subject::{Pose, Subject};
 use crate::device::camera::Settings;
-use crate::files::{FileError, Lock, free_bytes};
+use crate::files::{
+    FileError, Lock, UNFINISHED, WORK_FOLDER, clean_temporary, free_bytes, remove_noted,
+};
 use crate::session::{FrameEntry, Kind, MANIFEST, Session, SessionError, SessionWriter};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the camera saves, inside the capture session's folder; gone when the scan is over.
-const INCOMING: &str = ".incoming";
 /// Bytes of a frame beyond two for each photosite: previews, metadata.
 const FRAME_EXTRA: u64 = 2 << 20;
 
@@ -43,7 +43,9 @@ impl Place {
     /// The folder is made where it is absent.
     pub(super) fn take(folder: &Path) -> Result<Self, FileError> {
         fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
-        Ok(Self { folder: folder.to_owned(), lock: Lock::acquire(folder, "scan")? })
+        let lock = Lock::acquire(folder, "scan")?;
+        clean_temporary(folder);
+        Ok(Self { folder: folder.to_owned(), lock })
     }
 }
 
@@ -92,15 +94,10 @@ impl Store {
             Some(_) => SessionWriter::resume(folder)?,
             None => SessionWriter::create(new_session(folder, about, subject))?,
         };
-        let incoming = folder.join(INCOMING);
-        let failed = |source| FileError::write(&incoming, source);
-        // What a killed scan left there is no finished frame.
-        if incoming.exists() {
-            fs::remove_dir_all(&incoming).map_err(failed)?;
-        }
-        fs::create_dir(&incoming).map_err(failed)?;
+        let (incoming, kept) = begin_work_folder(writer.session())?;
         let mut store = Self { writer, files: vec![None; plan.steps.len()], incoming, _lock: lock };
-        let found = store.find(plan)?;
+        let mut found = store.find(plan)?;
+        found.warnings.extend(kept);
         Ok((store, found))
     }
 
@@ -157,7 +154,12 @@ impl Store {
         let ending = taken.path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let name = |tag: &str| PathBuf::from(format!("{}{tag}.{ending}", step.stem));
         let names = std::iter::once(name("")).chain((2..).map(|k| name(&format!("-take-{k}"))));
-        let file = names.into_iter().find(|name| old.as_ref() != Some(name)).unwrap_or(name(""));
+        // A file that nobody recorded is not ours to replace.
+        let folder = &self.session().folder;
+        let is_free = |name: &PathBuf| {
+            old.as_ref() != Some(name) && fs::symlink_metadata(folder.join(name)).is_err()
+        };
+        let file = names.into_iter().find(is_free).unwrap_or(name(""));
         let pose = step.board.filter(|pose| *pose == Pose::Table).map(|_| "table".to_owned());
         let drift_check = step.drift_check;
         let entry = FrameEntry { file: file.clone(), drift_check, pose, ..taken.entry };
@@ -177,6 +179,9 @@ impl Store {
     /// Empties the incoming folder: what is in there was not kept.
     pub(super) fn clear_incoming(&self) {
         for entry in fs::read_dir(&self.incoming).into_iter().flatten().flatten() {
+            if entry.file_name() == UNFINISHED {
+                continue;
+            }
             // What cannot be removed is only litter.
             let _ = fs::remove_file(entry.path());
         }
@@ -203,8 +208,11 @@ fn state_of(session: &Session, step: &Step) -> Result<State, ScanError> {
     }
     match session.read_frame(entry) {
         Ok(_) => Ok(State::Kept(entry.clone())),
-        Err(error @ (SessionError::FrameMissing { .. } | SessionError::FrameAltered { .. })) => {
+        Err(error @ SessionError::FrameMissing { .. }) => {
             Ok(State::Lost(entry.file.clone(), error.to_string()))
+        }
+        Err(error @ SessionError::FrameAltered { .. }) => {
+            Ok(State::Lost(entry.file.clone(), format!("{error}; the altered file stays")))
         }
         Err(error) => Err(error.into()),
     }
@@ -262,6 +270,33 @@ impl Drop for Store {
     fn drop(&mut self) {
         let _ = fs::remove_dir_all(&self.incoming);
     }
+}
+
+/// Makes the folder that the camera saves into, which is gone when the scan is over. One that a killed scan left holds no finished
+/// frame, but says which files of the capture session nobody recorded any more; one that the program did not make is moved out
+/// of the way. With a sentence about that.
+fn begin_work_folder(session: &Session) -> Result<(PathBuf, Option<String>), FileError> {
+    let (folder, work) = (&session.folder, session.folder.join(WORK_FOLDER));
+    let failed = |source| FileError::write(&work, source);
+    let mut said = None;
+    if fs::symlink_metadata(work.join(UNFINISHED)).is_ok() {
+        let is_recorded = |file: &Path| session.frames.iter().any(|frame| frame.file == file);
+        remove_noted(&work, folder, is_recorded);
+        fs::remove_dir_all(&work).map_err(failed)?;
+    } else if fs::remove_dir(&work).is_err() && fs::symlink_metadata(&work).is_ok() {
+        let names = (1..).map(|k| folder.join(format!("incoming-{k}")));
+        let free = names.into_iter().find(|path| fs::symlink_metadata(path).is_err());
+        let free = free.unwrap_or_else(|| folder.join("incoming"));
+        fs::rename(&work, &free).map_err(failed)?;
+        said = Some(format!(
+            "{}: was in the way of the scan and is now {}",
+            folder.join(WORK_FOLDER).display(),
+            free.display()
+        ));
+    }
+    fs::create_dir(&work).map_err(failed)?;
+    fs::write(work.join(UNFINISHED), "").map_err(failed)?;
+    Ok((work, said))
 }
 
 fn new_session(folder: &Path, about: &About, subject: &Subject) -> Session {
@@ -382,13 +417,14 @@ mod tests {
         }
         keep(&mut store, 4, "two");
         drop(store);
-        assert!(!folder.join(INCOMING).exists());
+        assert!(!folder.join(WORK_FOLDER).exists());
         let error = open(&folder, Begin::Anew).unwrap_err().to_string();
         assert!(error.contains("(linen, 3 frames); continue it with --resume"), "{error}");
         // Files of a killed scan that nobody recorded.
         fs::write(folder.join("light-05.nef"), "half").unwrap();
-        fs::create_dir(folder.join(INCOMING)).unwrap();
-        fs::write(folder.join(INCOMING).join("DSC_2.NEF"), "half").unwrap();
+        fs::create_dir(folder.join(WORK_FOLDER)).unwrap();
+        fs::write(folder.join(WORK_FOLDER).join(UNFINISHED), "").unwrap();
+        fs::write(folder.join(WORK_FOLDER).join("DSC_2.NEF"), "half").unwrap();
         let (mut store, found) = open(&folder, Begin::Resume).unwrap();
         assert_eq!(found.finished, [0, 4, 11]);
         assert_eq!(found.settings, Some(Settings { exposure_s: 0.5, iso: 100.0 }));
@@ -415,6 +451,70 @@ mod tests {
         assert_eq!(found.finished, [3]);
         assert_eq!(found.warnings.len(), 2, "{:?}", found.warnings);
         assert_eq!(store.session().frames.len(), 1);
+        assert_eq!(fs::read_to_string(home.path().join("light-00.nef")).unwrap(), "other");
+    }
+
+    /// What somebody put where the scan writes is neither replaced nor deleted.
+    #[test]
+    fn files_of_others_stay() {
+        let home = tempfile::tempdir().unwrap();
+        let at = |name: &str| home.path().join(name);
+        fs::write(at("light-00.nef"), "mine").unwrap();
+        fs::create_dir(at(WORK_FOLDER)).unwrap();
+        fs::write(at(WORK_FOLDER).join("notes.txt"), "mine").unwrap();
+        let (mut store, found) = open(home.path(), Begin::Anew).unwrap();
+        assert_eq!(found.warnings.len(), 1, "{:?}", found.warnings);
+        assert_eq!(fs::read_to_string(at("incoming-1").join("notes.txt")).unwrap(), "mine");
+        keep(&mut store, 1, "one");
+        assert_eq!(store.file(1), Some(at("light-00-take-2.nef")));
+        assert_eq!(fs::read_to_string(at("light-00.nef")).unwrap(), "mine");
+        // Altered while the scan runs: taken again, and not deleted.
+        fs::write(at("light-00-take-2.nef"), "edited").unwrap();
+        keep(&mut store, 1, "two");
+        assert_eq!(store.file(1), Some(at("light-00-take-3.nef")));
+        assert_eq!(fs::read_to_string(at("light-00-take-2.nef")).unwrap(), "edited");
+    }
+
+    /// Killed between the renaming of a frame and its record, or between that and the deletion of the earlier one.
+    #[test]
+    fn a_frame_that_a_killed_scan_did_not_record_goes() {
+        let home = tempfile::tempdir().unwrap();
+        let at = |name: &str| home.path().join(name);
+        let (mut store, _) = open(home.path(), Begin::Anew).unwrap();
+        keep(&mut store, 1, "one");
+        let recorded = fs::read(at(MANIFEST)).unwrap();
+        keep(&mut store, 1, "two");
+        let work = at(WORK_FOLDER);
+        let notes = fs::read(work.join(crate::files::LIST_FILE)).unwrap();
+        drop(store);
+        for (manifest, left) in
+            [(recorded, "light-00.nef"), (fs::read(at(MANIFEST)).unwrap(), "light-00-take-2.nef")]
+        {
+            fs::write(at(MANIFEST), manifest).unwrap();
+            fs::write(at("light-00.nef"), "one").unwrap();
+            fs::write(at("light-00-take-2.nef"), "two").unwrap();
+            fs::create_dir(&work).unwrap();
+            fs::write(work.join(UNFINISHED), "").unwrap();
+            fs::write(work.join(crate::files::LIST_FILE), &notes).unwrap();
+            let (store, found) = open(home.path(), Begin::Resume).unwrap();
+            assert_eq!(found.finished, [1]);
+            assert_eq!(store.file(1), Some(at(left)));
+            let other = ["light-00.nef", "light-00-take-2.nef"]
+                .into_iter()
+                .find(|name| *name != left)
+                .unwrap();
+            assert!(!at(other).exists(), "{other}");
+        }
+    }
+
+    #[test]
+    fn two_scans_cannot_write_one_capture_session() {
+        let home = tempfile::tempdir().unwrap();
+        let (store, _) = open(home.path(), Begin::Anew).unwrap();
+        let error = open(home.path(), Begin::Resume).unwrap_err().to_string();
+        assert!(error.contains("in use by") && error.contains("(this program: scan, "), "{error}");
+        drop(store);
+        open(home.path(), Begin::Resume).unwrap();
     }
 
     #[test]
