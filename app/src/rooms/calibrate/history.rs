@@ -4,7 +4,7 @@
 use super::task::Step;
 use crate::place::Place;
 use std::path::{Path, PathBuf};
-use weavelight::files::FileError;
+use weavelight::files::{FileError, exchange};
 
 /// Something that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -126,6 +126,16 @@ pub(super) fn keep(place: &Place) -> Result<Option<PathBuf>, FileError> {
     Ok(Some(entry))
 }
 
+/// Puts pictures that were refused away, where no step looks for them.
+pub(super) fn put_refused_away(place: &Place, refused: &Path) -> Result<(), FileError> {
+    let home = folder(place);
+    std::fs::create_dir_all(&home).map_err(|error| FileError::write(&home, error))?;
+    let stamp = jiff::Timestamp::now().strftime("%Y-%m-%dT%H%M");
+    let name = |k: usize| home.join(format!("refused-{stamp}-{k}"));
+    let free = (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0));
+    rename(refused, &free)
+}
+
 /// Takes an earlier calibration back into use, with its pictures, or a step's pictures alone; what they take the place of goes
 /// into the history. Where that is now.
 pub(super) fn restore(place: &Place, entry: &Entry) -> Result<Option<PathBuf>, FileError> {
@@ -138,17 +148,25 @@ pub(super) fn restore(place: &Place, entry: &Entry) -> Result<Option<PathBuf>, F
         let what = std::io::Error::from(std::io::ErrorKind::NotFound);
         return Err(FileError::read(&whole, what));
     }
-    let away = keep(place)?;
-    let (calibration, aside) = (place.calibration(), place.folder.join(".calibration-before"));
-    if calibration.exists() {
-        rename(&calibration, &aside)?;
+    let (calibration, targets) = (place.calibration(), place.targets());
+    let is_away = calibration.exists() || targets.exists();
+    let away = is_away.then(|| new_entry(place, Kept::Calibration)).transpose()?;
+    match &away {
+        // They change places, so that there is a calibration at any moment.
+        Some(away) if calibration.exists() => {
+            exchange(&whole, &calibration)
+                .map_err(|error| FileError::write(&calibration, error))?;
+            rename(&whole, &away.join("calibration"))?;
+        }
+        _ => rename(&whole, &calibration)?,
     }
-    rename(&whole, &calibration)?;
+    if let Some(away) = away.as_ref().filter(|_| targets.exists()) {
+        rename(&targets, &away.join("targets"))?;
+    }
     if entry.join("targets").exists() {
-        rename(&entry.join("targets"), &place.targets())?;
+        rename(&entry.join("targets"), &targets)?;
     }
-    // A copy is in the history, and the entry is empty: what cannot be removed is only litter.
-    let _ = std::fs::remove_dir_all(&aside);
+    // Whatever else somebody put there stays.
     let _ = std::fs::remove_dir(&entry);
     Ok(away)
 }

@@ -16,7 +16,7 @@ use weavelight::device::camera::Settings;
 use weavelight::device::scan::{
     self, About, Begin, Event, Instruments, Options, ScanError, Sheet, Subject, preview,
 };
-use weavelight::files::{Provenance, sha256_of_file};
+use weavelight::files::{FileError, Provenance, sha256_of_file};
 use weavelight::instrument::{Calibration, CameraKind, Rig};
 use weavelight::raw::{Frame, Hint, decode};
 use weavelight::session::{Board, FrameEntry, MANIFEST, Session, Target};
@@ -343,12 +343,12 @@ fn examine(task: Task, place: &Place, sheets: &mut Sheets, out: &Outbox) -> Resu
 }
 
 /// Out of the way of the fit; the last one that was refused can still be looked at.
-fn put_aside(place: &Place, folder: &Path) -> std::io::Result<()> {
+fn put_aside(place: &Place, folder: &Path) -> Result<(), FileError> {
     let refused = place.targets().join(REFUSED);
     if refused.exists() {
-        std::fs::remove_dir_all(&refused)?;
+        history::put_refused_away(place, &refused)?;
     }
-    std::fs::rename(folder, &refused)
+    std::fs::rename(folder, &refused).map_err(|error| FileError::write(&refused, error))
 }
 
 fn read(session: &Session, entry: &FrameEntry) -> Result<Frame, AnyError> {
