@@ -1,4 +1,5 @@
 use super::emission::{Emitter, PER_LIGHT, Place};
+use super::gain::has_several_poses;
 use super::joint::{Linearised, PER_SHEET, Prior, Problem, State};
 use super::observation::Sheet;
 use super::uncertainty::{covariance, damped_step, data_scale, estimate_scales};
@@ -95,32 +96,53 @@ pub struct Fit {
 pub fn fit(sheets: &[Sheet], priors: &[Prior], settings: &Settings) -> Result<Fit, Error> {
     check_cells(sheets, priors.len())?;
     let mut problem = Problem::new(sheets, priors.to_vec());
-    let start = State::start(priors, sheets.len());
-    let settled = settle(&mut problem, start, settings, Stage::Everything)?;
+    let mut start = State::start(priors, sheets.len());
+    problem.level(&mut start);
+    let settled = match settle(&mut problem, start.clone(), settings, Stage::Everything) {
+        Ok(settled) => settled,
+        // One pose may leave the positions open: then the ruler's stay.
+        Err(_) if !has_several_poses(sheets) => {
+            let none = vec![false; priors.len()];
+            problem = Problem::new(sheets, priors.to_vec());
+            let start = hold_unclaimed(&mut problem, &start, &none);
+            let held = settle(&mut problem, start, settings, Stage::PositionsHeld)?;
+            return Ok(describe_all(&problem, &held, &held, priors, &none));
+        }
+        Err(error) => return Err(error),
+    };
     let sigma: Vec<Option<f64>> = (0..priors.len()).map(|i| position_sigma(&settled, i)).collect();
     let claimed: Vec<bool> =
         sigma.iter().map(|sigma| sigma.is_none_or(|s| s <= settings.claim_sigma_mm)).collect();
-    let ruler_scale = problem.ruler_scale;
-    let kappa = problem.kappa;
     let mut last = settled.clone();
     if claimed.contains(&false) {
         let start = hold_unclaimed(&mut problem, &settled.state, &claimed);
         last = settle(&mut problem, start, settings, Stage::PositionsHeld)?;
     }
+    Ok(describe_all(&problem, &settled, &last, priors, &claimed))
+}
+
+/// `settled`: with all positions free; `last`: with those held that are not claimed.
+fn describe_all(
+    problem: &Problem,
+    settled: &Settled,
+    last: &Settled,
+    priors: &[Prior],
+    claimed: &[bool],
+) -> Fit {
     let lights = (0..priors.len())
-        .map(|i| describe(&problem, &settled, &last, &priors[i], i, claimed[i]))
+        .map(|i| describe(problem, settled, last, &priors[i], i, claimed[i]))
         .collect();
-    let inliers = inlier_square(&problem, &last, None);
-    Ok(Fit {
+    let inliers = inlier_square(problem, last, None);
+    Fit {
         lights,
         iterations: settled.iterations,
         residual_rms: inliers.0.sqrt(),
-        slow_error_rms: kappa,
-        ruler_scale,
-        trust: trust(&problem, &last),
-        covariance: settled.covariance,
-        pose_corrections: last.state.poses,
-    })
+        slow_error_rms: settled.slow_error_rms,
+        ruler_scale: settled.ruler_scale,
+        trust: trust(problem, last),
+        covariance: settled.covariance.clone(),
+        pose_corrections: last.state.poses.clone(),
+    }
 }
 
 fn check_cells(sheets: &[Sheet], lights: usize) -> Result<(), Error> {
@@ -149,6 +171,8 @@ struct Settled {
     residuals: Vec<Vec<f64>>,
     weights: Vec<Vec<f64>>,
     iterations: usize,
+    slow_error_rms: f64,
+    ruler_scale: f64,
 }
 
 /// Expected gain of the cost (in units where one sigma costs 1/2) below which a step is not worth taking.
@@ -181,19 +205,28 @@ fn settle(
         }
         let systems = problem.systems(&state, &weights);
         if open {
-            let before = problem.kappa;
+            let before = problem.slow.total();
             let ruler = stage == Stage::Everything && near;
             estimate_scales(problem, &systems, &state, ruler)?;
-            let calm = near && (problem.kappa / before).ln().abs() < SCALE_SETTLED;
+            let calm = near && (problem.slow.total() / before).ln().abs() < SCALE_SETTLED;
             open = !calm && (iterations < SCALE_ROUNDS || !near);
         }
-        let at = problem.assemble(&systems, &state, problem.kappa).ok_or(Error::Singular)?;
-        ripples = problem.ripples_from(&systems).ok_or(Error::Singular)?;
+        let at = problem.assemble(&systems, &state).ok_or(Error::Singular)?;
+        ripples = problem.ripples_from(&systems, &state).ok_or(Error::Singular)?;
         let (next, decrement) = advance(problem, &state, &at, &weights, &mut lambda)?;
         let last = iterations == settings.max_iterations;
         if decrement < if last { SETTLED_ENOUGH } else { SETTLED } && (last || !open) {
-            let covariance = covariance(&at).ok_or(Error::Singular)?;
-            return Ok(Settled { state, covariance, residuals, weights, iterations });
+            let covariance = covariance(problem, &at).ok_or(Error::Singular)?;
+            let (slow_error_rms, ruler_scale) = (problem.slow.total(), problem.ruler_scale);
+            return Ok(Settled {
+                state,
+                covariance,
+                residuals,
+                weights,
+                iterations,
+                slow_error_rms,
+                ruler_scale,
+            });
         }
         near |= decrement < NEAR;
         state = next;
@@ -231,11 +264,7 @@ fn advance(
         let decrement = 0.5 * step.dot(&at.descent);
         step *= (LONGEST_STEP / longest(problem, &step)).min(1.0);
         let next = state.moved(&step);
-        let cost = || {
-            problem
-                .assemble(&problem.systems(&next, weights), &next, problem.kappa)
-                .map(|at| at.cost)
-        };
+        let cost = || problem.assemble(&problem.systems(&next, weights), &next).map(|at| at.cost);
         if decrement < SETTLED || cost().is_some_and(|cost| cost < TOLERATED * at.cost.max(1.0)) {
             *lambda = if *lambda < 0.1 { 0.0 } else { *lambda * 0.1 };
             return Ok((next, decrement));
@@ -277,7 +306,9 @@ fn describe(
     claimed: bool,
 ) -> FittedLight {
     let estimate = position(&settled.state.emitters[i]);
-    let variance = position_sigma(settled, i).map(|sigma| sigma * sigma);
+    // Held from the first on: nothing but the ruler speaks of it.
+    let least = if std::ptr::eq(settled, last) && !claimed { prior.position_sigma_mm } else { 0.0 };
+    let variance = position_sigma(settled, i).map(|sigma| sigma * sigma + least * least);
     // The error to expect of the ruler's value, given the pictures: E|true - ruler|^2 = var + |estimate - ruler|^2.
     let moved = match (estimate, position(&prior.emitter)) {
         (Some(estimate), Some(ruler)) if !claimed => (estimate - ruler).norm_squared() / 3.0,

@@ -19,6 +19,9 @@ const SHEET_DEGREE: usize = 12;
 /// degree), and vignetting that is not radial. They tell the two apart where the poses do not.
 const UNEVEN_SIGMA: f64 = 0.01;
 const OFF_RADIAL_SIGMA: f64 = 0.002;
+/// Beside the cells a gain goes on by this factor's logarithm at most: a sheet that covers half of the frame must not make a
+/// gain of 1e30 in its corner.
+const BEYOND: f64 = 0.25;
 /// Cells farther from the smooth gain than this many robust sigmas show no sheet.
 const OUTLIER_SIGMAS: f64 = 5.0;
 
@@ -71,6 +74,8 @@ struct Channel {
     per_light_degree: usize,
     unevenness: Option<f64>,
     residual_rms: f64,
+    /// Least and largest logarithm of a gain where cells are; beside them polynomials know nothing.
+    seen: [f64; 2],
 }
 
 /// ln vignetting: coefficients of [`vignetting_basis`], zero at the frame's centre.
@@ -106,13 +111,34 @@ impl Channel {
         let centre = vignetting.at_centre();
         let log_intensity = relative.iter().map(|a| a + centre).collect();
         let unevenness = several.then(|| sheet.peak_to_peak(&sheets[0]));
-        Self { log_intensity, vignetting, per_light, per_light_degree, unevenness, residual_rms }
+        let seen = [0.0; 2];
+        let mut channel = Self {
+            log_intensity,
+            vignetting,
+            per_light,
+            per_light_degree,
+            unevenness,
+            residual_rms,
+            seen,
+        };
+        for place in places.iter().flatten() {
+            for i in 0..lights {
+                let log = channel.log_gain(i, *place, frame_px);
+                channel.seen = [channel.seen[0].min(log), channel.seen[1].max(log)];
+            }
+        }
+        channel
     }
 
     /// Gain of light `i` at a place of the frame in [-1, 1]^2.
     fn gain(&self, i: usize, place: [f64; 2], frame_px: [usize; 2]) -> f64 {
+        let [low, high] = self.seen;
+        self.log_gain(i, place, frame_px).clamp(low - BEYOND, high + BEYOND).exp()
+    }
+
+    fn log_gain(&self, i: usize, place: [f64; 2], frame_px: [usize; 2]) -> f64 {
         let own = dot(&self.per_light[i], &legendre_products(place, 0, self.per_light_degree));
-        (self.vignetting.at(place, frame_px) - self.vignetting.at_centre() + own).exp()
+        self.vignetting.at(place, frame_px) - self.vignetting.at_centre() + own
     }
 }
 

@@ -1,10 +1,10 @@
 //! The ratio-mode least-squares problem: one free gain per cell, shared by all lights, eliminated exactly.
 
-use super::basis::{degrees, legendre_products, normalised};
 use super::emission::{Emitter, LogIrradiance, PER_LIGHT, Place, tangents};
 use super::observation::{Cell, Sample, Sheet};
+use super::slow::SlowErrors;
 use super::system::SheetSystem;
-use nalgebra::{DMatrix, DVector, Point3, UnitVector3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Point3, UnitVector3, Vector3};
 
 /// Parameters of a sheet's pose: two tilts and the offset along the normal.
 pub(super) const PER_SHEET: usize = 3;
@@ -14,11 +14,9 @@ const SIGMA_FLOOR: f64 = 3e-4;
 const ROBUST_SCALES: f64 = 6.0;
 /// The overall intensity is free in ratio mode; its mean is held with this weight.
 const GAUGE_WEIGHT: f64 = 1e6;
-/// Degree of the polynomials that stand for slow, light-dependent errors (the sheet's reflectance lobe, stray light).
-const RIPPLE_DEGREE: usize = 5;
-/// Beyond this many lights the lower degree is enough of a load.
-const MANY_LIGHTS: usize = 16;
-const RIPPLE_DEGREE_FOR_MANY: usize = 3;
+/// Weight of a light's log intensity before the pictures: it may be anything, but a light that no sample is left of must not
+/// leave the equations without a solution.
+const INTENSITY_WEIGHT: f64 = 1e-2;
 
 /// What is believed of a light before any picture.
 #[derive(Clone, Debug)]
@@ -49,8 +47,6 @@ pub(super) struct Linearised {
     pub(super) descent: DVector<f64>,
     /// The cost: half the weighted square sum about each cell's own gain and the slow errors, plus the priors.
     pub(super) cost: f64,
-    /// Half the log determinant that eliminating the slow errors leaves over (for the evidence).
-    pub(super) log_volume: f64,
 }
 
 /// One light's log signal in one cell, channels combined.
@@ -69,9 +65,8 @@ pub(super) struct Problem<'a> {
     pub(super) ruler_scale: f64,
     /// Variance of the data in units of the readings' own.
     pub(super) data_scale: f64,
-    /// RMS of the slow, light-dependent errors, each sheet and light its own.
-    pub(super) kappa: f64,
-    ripple_degree: usize,
+    /// The prior of the slow, light-dependent errors.
+    pub(super) slow: SlowErrors,
 }
 
 impl State {
@@ -134,10 +129,9 @@ impl<'a> Problem<'a> {
         let read =
             |sheet: &Sheet| sheet.samples.iter().map(|sample| combine(sample, &weights)).collect();
         let readings = sheets.iter().map(read).collect();
-        let ripple_degree =
-            if priors.len() <= MANY_LIGHTS { RIPPLE_DEGREE } else { RIPPLE_DEGREE_FOR_MANY };
-        let (ruler_scale, data_scale, kappa, lights) = (1.0, 1.0, 1e-3, priors.len());
-        Self { sheets, lights, readings, priors, ruler_scale, data_scale, kappa, ripple_degree }
+        let (ruler_scale, data_scale, lights) = (1.0, 1.0, priors.len());
+        let slow = SlowErrors::for_lights(lights);
+        Self { sheets, lights, readings, priors, ruler_scale, data_scale, slow }
     }
 
     pub(super) fn parameters(&self) -> usize {
@@ -145,7 +139,7 @@ impl<'a> Problem<'a> {
     }
 
     pub(super) fn parameters_with_slow_errors(&self) -> usize {
-        self.parameters() + self.sheets.len() * self.lights * self.ripples()
+        self.parameters() + self.sheets.len() * self.lights * self.slow.per_light()
     }
 
     /// Residuals (log signal less model) of every cell and light, sheet by sheet; NaN where there is none.
@@ -177,14 +171,24 @@ impl<'a> Problem<'a> {
             .enumerate()
             .map(|(s, of_sheet)| self.standardised(s, of_sheet))
             .collect();
-        let mut sizes: Vec<f64> =
-            standard.iter().flatten().filter(|u| u.is_finite()).map(|u| u.abs()).collect();
-        // The median takes one light of each cell as the centre: with few lights many residuals are zero by construction.
-        let freedom = self.lights as f64 / (self.lights as f64 - 1.0).max(1.0);
-        let scale = (1.4826 * freedom * median(&mut sizes)).max(1e-3);
+        let scale_of = |values: &mut dyn Iterator<Item = &f64>| {
+            let mut sizes: Vec<f64> = values.filter(|u| u.is_finite()).map(|u| u.abs()).collect();
+            // The median takes one light of each cell as the centre: with few lights many residuals are zero by construction.
+            let freedom = self.lights as f64 / (self.lights as f64 - 1.0).max(1.0);
+            (1.4826 * freedom * median(&mut sizes)).max(1e-3)
+        };
+        let scale = scale_of(&mut standard.iter().flatten());
+        // A light that is far from the model as a whole (its beam is not yet known) is no outlier: parts of it are.
+        let scales: Vec<f64> = (0..self.lights)
+            .map(|i| {
+                let own = standard.iter().flat_map(|u| u.iter().skip(i).step_by(self.lights));
+                scale_of(&mut own.into_iter()).max(scale)
+            })
+            .collect();
         let weigh = |(s, of_sheet): (usize, &Vec<f64>)| {
             let weight = |(k, u): (usize, &f64)| {
-                let robust = (1.0 - (u / (ROBUST_SCALES * scale)).powi(2)).max(0.0).powi(2);
+                let reach = ROBUST_SCALES * scales[k % self.lights];
+                let robust = (1.0 - (u / reach).powi(2)).max(0.0).powi(2);
                 if u.is_finite() { robust / self.sigma(s, k).powi(2) } else { 0.0 }
             };
             of_sheet.iter().enumerate().map(weight).collect()
@@ -203,6 +207,29 @@ impl<'a> Problem<'a> {
             out.extend(cell.iter().enumerate().map(over_sigma));
         }
         out
+    }
+
+    /// Sets every light's strength to what its pictures say at the first glance (medians over cells, in turns with medians over
+    /// lights): a weak light must not pass for an outlier.
+    pub(super) fn level(&self, state: &mut State) {
+        for _ in 0..3 {
+            let residuals = self.residuals(state);
+            let mut offs: Vec<Vec<f64>> = vec![Vec::new(); self.lights];
+            for cell in residuals.iter().flat_map(|sheet| sheet.chunks(self.lights)) {
+                let mut usable: Vec<f64> = cell.iter().copied().filter(|r| r.is_finite()).collect();
+                let centre = median(&mut usable);
+                for (off, r) in offs.iter_mut().zip(cell).filter(|(_, r)| r.is_finite()) {
+                    off.push(r - centre);
+                }
+            }
+            for (emitter, off) in state.emitters.iter_mut().zip(&mut offs) {
+                let off = median(off);
+                emitter.log_intensity += if off.is_finite() { off } else { 0.0 };
+            }
+            // Only ratios count: the mean stays where the priors have it.
+            let gauge = self.gauge(state) / self.lights as f64;
+            state.emitters.iter_mut().for_each(|emitter| emitter.log_intensity -= gauge);
+        }
     }
 
     fn prior_cost(&self, state: &State) -> f64 {
@@ -234,6 +261,7 @@ impl<'a> Problem<'a> {
     /// Per parameter of a light: how far it is from the prior, and the prior's weight.
     fn prior_terms(&self, emitter: &Emitter, prior: &Prior) -> [(f64, f64); PER_LIGHT] {
         let angle = prior.angle_sigma_rad.powi(-2);
+        let intensity = (emitter.log_intensity - prior.emitter.log_intensity, INTENSITY_WEIGHT);
         let turn = |from: &UnitVector3<f64>, to: &UnitVector3<f64>| {
             tangents(to).map(|t| (-t.dot(from), angle))
         };
@@ -253,13 +281,13 @@ impl<'a> Problem<'a> {
                     first,
                     second,
                     exponent,
-                    (0.0, 0.0),
+                    intensity,
                 ]
             }
             (Place::Far { direction }, Place::Far { direction: direction0 }) => {
                 let [first, second] = turn(direction0, direction);
                 let unused = (0.0, 1.0);
-                [unused, unused, unused, first, second, unused, (0.0, 0.0)]
+                [unused, unused, unused, first, second, unused, intensity]
             }
             _ => [(0.0, 1.0); PER_LIGHT],
         }
@@ -272,13 +300,13 @@ impl<'a> Problem<'a> {
 
     fn sheet_system(&self, s: usize, state: &State, weights: &[f64]) -> SheetSystem {
         let (lights, sheet) = (self.lights, &self.sheets[s]);
-        let mut system = SheetSystem::new(lights, self.ripples());
+        let mut system = SheetSystem::new(lights, self.slow.per_light());
         for (c, cell) in sheet.cells.iter().enumerate() {
             let placed = place(sheet, cell, &state.poses[s]);
             let range = c * lights..(c + 1) * lights;
             let at: Vec<Option<LogIrradiance>> =
                 state.emitters.iter().map(|e| e.linearise(&placed.point, &placed.normal)).collect();
-            let ripples = self.ripples_at(sheet, cell);
+            let ripples = self.slow.at(sheet, cell);
             let readings = &self.readings[s][range.clone()];
             system.add_cell(&at, readings, &weights[range], &placed, &ripples);
         }
@@ -286,51 +314,68 @@ impl<'a> Problem<'a> {
         system
     }
 
-    /// Slow errors per light and sheet.
-    fn ripples(&self) -> usize {
-        degrees(1, self.ripple_degree).count()
-    }
-
-    fn ripples_at(&self, sheet: &Sheet, cell: &Cell) -> Vec<f64> {
-        legendre_products(normalised(cell.place, sheet.grid), 1, self.ripple_degree)
-    }
-
-    /// 1 / variance of each slow error of one light for an RMS of `kappa`: the lower the degree, the larger the error.
-    fn precision_for(&self, kappa: f64) -> Vec<f64> {
-        let shares: Vec<f64> =
-            degrees(1, self.ripple_degree).map(|(a, b)| ((a + b) as f64).powi(-2)).collect();
-        let total: f64 = shares.iter().sum();
-        shares.iter().map(|share| total / share / (kappa * kappa)).collect()
-    }
-
-    /// All sheets and priors together, the slow errors of RMS `kappa` eliminated.
-    pub(super) fn assemble(
-        &self,
-        systems: &[SheetSystem],
-        state: &State,
-        kappa: f64,
-    ) -> Option<Linearised> {
+    /// All sheets and priors together over (lights, poses, then the slow errors that sheets share, light by light); those of
+    /// single sheets eliminated.
+    pub(super) fn joint(&self, systems: &[SheetSystem], state: &State) -> Option<Linearised> {
         let n = self.parameters();
+        let fixed = self.slow.fixed_precision();
+        let all = n + self.lights * fixed.len();
         let mut out = Linearised {
-            hessian: DMatrix::zeros(n, n),
-            descent: DVector::zeros(n),
+            hessian: DMatrix::zeros(all, all),
+            descent: DVector::zeros(all),
             cost: 0.0,
-            log_volume: 0.0,
         };
-        let precision = self.precision_for(kappa);
-        let pose_at = self.lights * PER_LIGHT;
         for (s, system) in systems.iter().enumerate() {
-            system.eliminate(&precision)?.scatter(pose_at + s * PER_SHEET, pose_at, &mut out);
+            let places = self.places(s);
+            system.eliminate(&self.slow)?.scatter(&places, &mut out);
+        }
+        for k in n..all {
+            out.hessian[(k, k)] += fixed[(k - n) % fixed.len()];
         }
         self.add_priors(state, &mut out);
         out.cost += 0.5 * self.prior_cost(state);
         Some(out)
     }
 
+    /// Where the parameters of sheet `s` (lights, its pose, shared slow errors) are among those of all.
+    pub(super) fn places(&self, s: usize) -> Vec<usize> {
+        let pose_at = self.lights * PER_LIGHT;
+        let pose = pose_at + s * PER_SHEET;
+        let n = self.parameters();
+        let shared = self.lights * self.slow.fixed().len();
+        (0..pose_at).chain(pose..pose + PER_SHEET).chain(n..n + shared).collect()
+    }
+
+    /// All sheets and priors together, all slow errors eliminated.
+    pub(super) fn assemble(&self, systems: &[SheetSystem], state: &State) -> Option<Linearised> {
+        let joint = self.joint(systems, state)?;
+        let n = self.parameters();
+        let shared = joint.hessian.nrows() - n;
+        let factor = Cholesky::new(joint.hessian.view((n, n), (shared, shared)).into_owned())?;
+        let mut cross = joint.hessian.view((n, 0), (shared, n)).into_owned();
+        let mut right = joint.descent.rows(n, shared).into_owned();
+        let l = factor.l_dirty();
+        (l.solve_lower_triangular_mut(&mut cross) && l.solve_lower_triangular_mut(&mut right))
+            .then_some(())?;
+        let mut hessian = joint.hessian.view((0, 0), (n, n)).into_owned();
+        let mut descent = joint.descent.rows(0, n).into_owned();
+        hessian.gemm_tr(-1.0, &cross, &cross, 1.0);
+        descent.gemv_tr(-1.0, &cross, &right, 1.0);
+        Some(Linearised { hessian, descent, cost: joint.cost - 0.5 * right.norm_squared() })
+    }
+
     /// The most probable slow errors of every sheet at the state of `systems`, light by light.
-    pub(super) fn ripples_from(&self, systems: &[SheetSystem]) -> Option<Vec<DVector<f64>>> {
-        let precision = self.precision_for(self.kappa);
-        systems.iter().map(|system| system.ripples(&precision)).collect()
+    pub(super) fn ripples_from(
+        &self,
+        systems: &[SheetSystem],
+        state: &State,
+    ) -> Option<Vec<DVector<f64>>> {
+        let joint = self.joint(systems, state)?;
+        let n = self.parameters();
+        let shared = joint.hessian.nrows() - n;
+        let factor = Cholesky::new(joint.hessian.view((n, n), (shared, shared)).into_owned())?;
+        let shared = factor.solve(&joint.descent.rows(n, shared).into_owned());
+        systems.iter().map(|system| system.ripples(&self.slow, &shared)).collect()
     }
 
     /// Residuals less slow errors: what is left is noise and outliers. Empty `ripples`: none.
@@ -343,7 +388,7 @@ impl<'a> Problem<'a> {
         for ((sheet, out), ripples) in self.sheets.iter().zip(&mut out).zip(ripples) {
             let per_light = ripples.len() / self.lights;
             for (cell, out) in sheet.cells.iter().zip(out.chunks_mut(self.lights)) {
-                let basis = self.ripples_at(sheet, cell);
+                let basis = self.slow.at(sheet, cell);
                 for (value, mine) in out.iter_mut().zip(ripples.as_slice().chunks(per_light)) {
                     *value -= basis.iter().zip(mine).map(|(b, x)| b * x).sum::<f64>();
                 }

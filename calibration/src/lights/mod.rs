@@ -8,6 +8,7 @@ mod gain;
 mod joint;
 mod observation;
 mod plan;
+mod slow;
 mod system;
 mod uncertainty;
 mod wiring;

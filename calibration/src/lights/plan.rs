@@ -46,17 +46,17 @@ impl Plan<'_> {
         let priors: Vec<Prior> =
             self.lights.iter().zip(self.ruler_sigma_mm).map(|(l, s)| prior(l, *s)).collect();
         let mut problem = Problem::new(&sheets, priors);
-        problem.kappa = self.slow_error_rms.max(1e-5);
+        problem.slow.set_total(self.slow_error_rms.max(1e-5));
         let state = State::start(&problem.priors, sheets.len());
         let weight = self.cell_noise.max(1e-6).powi(-2);
         let weights: Vec<Vec<f64>> =
             sheets.iter().map(|sheet| vec![weight; sheet.samples.len()]).collect();
-        let at = problem.assemble(&problem.systems(&state, &weights), &state, problem.kappa)?;
+        let at = problem.assemble(&problem.systems(&state, &weights), &state)?;
         debug_assert_eq!(
             at.descent.len(),
             self.lights.len() * PER_LIGHT + sheets.len() * PER_SHEET
         );
-        let covariance = covariance(&at)?;
+        let covariance = covariance(&problem, &at)?;
         let sigma = |(i, light): (usize, &Light)| match light {
             Light::Point(_) => {
                 let sum: f64 =

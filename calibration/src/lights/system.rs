@@ -2,6 +2,7 @@
 
 use super::emission::{LogIrradiance, PER_LIGHT};
 use super::joint::{Linearised, PER_SHEET, Placed, Reading, weighted_mean};
+use super::slow::{Evidence, SlowErrors};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// J'WJ and J'Wr of one sheet over (lights, its pose, slow errors light by light), each cell's gain eliminated. Lower
@@ -17,12 +18,12 @@ pub(super) struct SheetSystem {
     ripples_per_light: usize,
 }
 
-/// What is left of a sheet once its slow errors are eliminated.
+/// What is left of a sheet once its slow errors are eliminated: over lights, its pose, and the slow errors that all sheets
+/// share.
 pub(super) struct Reduced {
     hessian: DMatrix<f64>,
     descent: DVector<f64>,
     cost: f64,
-    log_volume: f64,
 }
 
 /// One row of J: a light in a cell.
@@ -121,44 +122,95 @@ impl SheetSystem {
         Cholesky::new(block)
     }
 
-    /// The most probable slow errors at the state of the system, light by light.
-    pub(super) fn ripples(&self, precision: &[f64]) -> Option<DVector<f64>> {
-        let descent = self.descent.rows(self.kept, self.ripple_count()).into_owned();
-        Some(self.ripple_factor(precision)?.solve(&descent))
+    /// Numbers, among this sheet's slow errors, of those that all sheets share, light by light.
+    fn shared(&self, slow: &SlowErrors) -> Vec<usize> {
+        let lights = self.ripple_count() / self.ripples_per_light;
+        (0..lights)
+            .flat_map(|i| slow.fixed().map(move |k| i * self.ripples_per_light + k))
+            .collect()
     }
 
-    /// Schur complement over the slow errors, whose prior has 1 / variance `precision` (one light's).
-    pub(super) fn eliminate(&self, precision: &[f64]) -> Option<Reduced> {
-        let kept = self.kept;
-        let mut hessian = self.hessian.view((0, 0), (kept, kept)).into_owned();
-        let mut descent = self.descent.rows(0, kept).into_owned();
-        let n = self.ripple_count();
-        let factor = self.ripple_factor(precision)?;
-        let mut cross = self.hessian.view((kept, 0), (n, kept)).into_owned();
+    /// The most probable slow errors at the state of the system, light by light, with `fixed` those that all sheets share: a
+    /// sheet's own scatter about them.
+    pub(super) fn ripples(&self, slow: &SlowErrors, fixed: &DVector<f64>) -> Option<DVector<f64>> {
+        let precision = slow.precision();
+        let mut right = self.descent.rows(self.kept, self.ripple_count()).into_owned();
+        for (value, k) in fixed.iter().zip(self.shared(slow)) {
+            right[k] += precision[k % self.ripples_per_light] * value;
+        }
+        Some(self.ripple_factor(&precision)?.solve(&right))
+    }
+
+    /// Schur complement over the slow errors u, whose prior is N(q, 1 / precision) with q those that all sheets share. With
+    /// B = [H_uk, -P E], E putting q among u: the quadratic form loses B' (H_uu + P)^-1 B.
+    pub(super) fn eliminate(&self, slow: &SlowErrors) -> Option<Reduced> {
+        let (kept, n) = (self.kept, self.ripple_count());
+        let precision = slow.precision();
+        let shared = self.shared(slow);
+        let all = kept + shared.len();
+        let factor = self.ripple_factor(&precision)?;
+        let mut cross = DMatrix::zeros(n, all);
+        cross.columns_mut(0, kept).copy_from(&self.hessian.view((kept, 0), (n, kept)));
+        let mut hessian = DMatrix::zeros(all, all);
+        hessian.view_mut((0, 0), (kept, kept)).copy_from(&self.hessian.view((0, 0), (kept, kept)));
+        for (column, k) in shared.iter().enumerate() {
+            let weight = precision[k % self.ripples_per_light];
+            cross[(*k, kept + column)] = -weight;
+            hessian[(kept + column, kept + column)] = weight;
+        }
+        let mut descent = DVector::zeros(all);
+        descent.rows_mut(0, kept).copy_from(&self.descent.rows(0, kept));
         let mut right = self.descent.rows(kept, n).into_owned();
         let l = factor.l_dirty();
         (l.solve_lower_triangular_mut(&mut cross) && l.solve_lower_triangular_mut(&mut right))
             .then_some(())?;
         hessian.gemm_tr(-1.0, &cross, &cross, 1.0);
         descent.gemv_tr(-1.0, &cross, &right, 1.0);
-        let prior: f64 =
-            precision.iter().map(|p| p.ln()).sum::<f64>() * (n / self.ripples_per_light) as f64;
-        let log_volume = l.diagonal().iter().map(|d| d.ln()).sum::<f64>() - 0.5 * prior;
-        Some(Reduced { hessian, descent, cost: self.cost - 0.5 * right.norm_squared(), log_volume })
+        Some(Reduced { hessian, descent, cost: self.cost - 0.5 * right.norm_squared() })
+    }
+
+    /// Adds what this sheet says of the sizes of its own slow errors (less the shared ones): `step` and `covariance` are those of
+    /// (lights, this pose, shared ones).
+    pub(super) fn learn(
+        &self,
+        slow: &SlowErrors,
+        step: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        evidence: &mut [Evidence; 4],
+    ) -> Option<()> {
+        let (kept, n) = (self.kept, self.ripple_count());
+        let (precision, shares, shared) = (slow.precision(), slow.shares(), self.shared(slow));
+        let factor = self.ripple_factor(&precision)?;
+        // How (H_uu + P) times u - E q answers to lights, pose and q.
+        let mut answer = DMatrix::zeros(n, kept + shared.len());
+        answer.columns_mut(0, kept).copy_from(&self.hessian.view((kept, 0), (n, kept)));
+        for (column, k) in shared.iter().enumerate() {
+            for row in 0..n {
+                let (a, b) = (row.max(*k), row.min(*k));
+                answer[(row, kept + column)] = self.hessian[(kept + a, kept + b)];
+            }
+        }
+        let mean = factor.solve(&(self.descent.rows(kept, n) - &answer * step));
+        factor.solve_mut(&mut answer);
+        let spread = &answer * covariance;
+        let own = factor.inverse();
+        for k in 0..n {
+            let variance = own[(k, k)] + spread.row(k).dot(&answer.row(k));
+            slow.learn(evidence, shares[k % self.ripples_per_light], mean[k], variance);
+        }
+        Some(())
     }
 }
 
 impl Reduced {
-    /// Adds into the system of all sheets, whose parameters from `pose_at` on are poses, this sheet's at `pose_to`.
-    pub(super) fn scatter(&self, pose_to: usize, pose_at: usize, out: &mut Linearised) {
-        let to = |k: usize| if k < pose_at { k } else { pose_to + k - pose_at };
-        for column in 0..self.hessian.ncols() {
-            out.descent[to(column)] += self.descent[column];
-            for row in column..self.hessian.nrows() {
-                out.hessian[(to(row), to(column))] += self.hessian[(row, column)];
+    /// Adds into the system of all sheets, this one's parameters at `places`.
+    pub(super) fn scatter(&self, places: &[usize], out: &mut Linearised) {
+        for (column, to) in places.iter().enumerate() {
+            out.descent[*to] += self.descent[column];
+            for (row, to_row) in places.iter().enumerate().skip(column) {
+                out.hessian[(*to_row, *to)] += self.hessian[(row, column)];
             }
         }
         out.cost += self.cost;
-        out.log_volume += self.log_volume;
     }
 }

@@ -3,6 +3,7 @@
 use super::emission::PER_LIGHT;
 use super::fit::Error;
 use super::joint::{Linearised, Problem, State, median, weighted_mean};
+use super::slow::Evidence;
 use super::system::SheetSystem;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -12,8 +13,10 @@ const BLOCK_SIDES: [usize; 3] = [1, 2, 4];
 const LEAST_FREEDOM: f64 = 0.25;
 /// Samples whose robust weight fell below this share are outliers and say nothing about the noise.
 const INLIER_WEIGHT: f64 = 0.25;
-/// RMS of slow errors that is thought possible: below the first they do not matter, above the last it is no white sheet.
-const SLOW_ERRORS: (f64, f64) = (1e-5, 0.05);
+/// Turns of the fixed point of the slow errors' sizes at one linearisation.
+const SLOW_ROUNDS: usize = 2;
+/// Variance of the noise, in units of the readings' own, below which rounding would decide.
+const LEAST_NOISE: f64 = 1e-3;
 /// The ruler's sigma is trusted within this factor either way.
 const RULER_SCALES: (f64, f64) = (0.5, 1.6);
 /// Spread of ln(ruler scale) before the data.
@@ -31,7 +34,7 @@ pub(super) fn data_scale(problem: &Problem, residuals: &[Vec<f64>], weights: &[V
     let mut sides = sides.peekable();
     let single = sides.peek().copied().unwrap_or(1.0);
     let inflation = sides.fold(1.0, |most: f64, variance| most.max(variance / single));
-    (white * inflation).max(1e-6)
+    (white * inflation).max(LEAST_NOISE)
 }
 
 /// Robust variance of (r1 - 2 r2 + r3) / sqrt 6 along the rows of the grids, in the readings' own units.
@@ -124,7 +127,7 @@ fn sheet_blocks(
     (square, (blocks.len() * lights) as f64, blocks.len() as f64)
 }
 
-/// Sets the RMS of the slow errors, and with `ruler` the factor on the ruler's sigma, to what makes the pictures most
+/// Sets the sizes of the slow errors, and with `ruler` the factor on the ruler's sigma, to what makes the pictures most
 /// probable.
 pub(super) fn estimate_scales(
     problem: &mut Problem,
@@ -132,42 +135,43 @@ pub(super) fn estimate_scales(
     state: &State,
     ruler: bool,
 ) -> Result<(), Error> {
-    problem.kappa = slow_error_rms(problem, systems, state);
+    for _ in 0..SLOW_ROUNDS {
+        let evidence = slow_evidence(problem, systems, state).ok_or(Error::Singular)?;
+        problem.slow.adopt(&evidence);
+    }
     if ruler {
-        let at = problem.assemble(systems, state, problem.kappa).ok_or(Error::Singular)?;
+        let at = problem.assemble(systems, state).ok_or(Error::Singular)?;
         problem.ruler_scale = ruler_scale(problem, state, &at);
     }
     Ok(())
 }
 
-/// Maximum of the marginal likelihood (parameters and slow errors integrated out of the linearised problem; with
-/// everything Gaussian this is restricted maximum likelihood), so that what the parameters absorbed is accounted for.
-/// Golden-section search over ln kappa.
-fn slow_error_rms(problem: &Problem, systems: &[SheetSystem], state: &State) -> f64 {
-    let score = |log_kappa: f64| {
-        let value = problem.assemble(systems, state, log_kappa.exp()).and_then(|at| {
-            let factor = Cholesky::new(at.hessian.clone())?;
-            let best = at.cost - 0.5 * at.descent.dot(&factor.solve(&at.descent));
-            Some(-best - at.log_volume - half_log_det(&factor))
-        });
-        value.unwrap_or(f64::NEG_INFINITY)
-    };
-    let shrink = (5f64.sqrt() - 1.0) / 2.0;
-    let (mut low, mut high) = (SLOW_ERRORS.0.ln(), SLOW_ERRORS.1.ln());
-    let (mut a, mut b) = (high - shrink * (high - low), low + shrink * (high - low));
-    let (mut at_a, mut at_b) = (score(a), score(b));
-    while high - low > 0.1 {
-        if at_a > at_b {
-            (high, b, at_b) = (b, a, at_a);
-            a = high - shrink * (high - low);
-            at_a = score(a);
-        } else {
-            (low, a, at_a) = (a, b, at_b);
-            b = low + shrink * (high - low);
-            at_b = score(b);
+/// What the linearised pictures say of the slow errors' sizes once the parameters have taken what they can.
+fn slow_evidence(
+    problem: &Problem,
+    systems: &[SheetSystem],
+    state: &State,
+) -> Option<[Evidence; 4]> {
+    let joint = problem.joint(systems, state)?;
+    let factor = definite(&joint.hessian, &problem.prior_weights())?;
+    let (step, covariance) = (factor.solve(&joint.descent), factor.inverse());
+    let mut evidence = [Evidence::default(); 4];
+    for (s, system) in systems.iter().enumerate() {
+        let places = problem.places(s);
+        let step = DVector::from_iterator(places.len(), places.iter().map(|k| step[*k]));
+        let own =
+            DMatrix::from_fn(places.len(), places.len(), |i, j| covariance[(places[i], places[j])]);
+        system.learn(&problem.slow, &step, &own, &mut evidence)?;
+    }
+    let (n, shares) = (problem.parameters(), problem.slow.fixed_shares());
+    // With one sheet nothing tells what others would share.
+    if systems.len() > 1 {
+        for k in n..step.len() {
+            let share = shares[(k - n) % shares.len()];
+            problem.slow.learn(&mut evidence, share, step[k], covariance[(k, k)]);
         }
     }
-    (0.5 * (low + high)).exp()
+    Some(evidence)
 }
 
 fn half_log_det(factor: &Cholesky<f64, Dyn>) -> f64 {
@@ -230,16 +234,32 @@ fn evidence(
 }
 
 /// Inverse of the cost's second derivative.
-pub(super) fn covariance(at: &Linearised) -> Option<DMatrix<f64>> {
-    Cholesky::new(at.hessian.clone()).map(|factor| factor.inverse())
+pub(super) fn covariance(problem: &Problem, at: &Linearised) -> Option<DMatrix<f64>> {
+    definite(&at.hessian, &problem.prior_weights()).map(|factor| factor.inverse())
 }
 
 /// One Levenberg step: (H + lambda P) step = descent, with P the priors' own weights, so that damping shortens the step in
 /// the directions that the pictures leave open, in units of what the ruler allows.
 pub(super) fn damped_step(problem: &Problem, at: &Linearised, lambda: f64) -> Option<DVector<f64>> {
+    let weights = problem.prior_weights();
     let mut hessian = at.hessian.clone();
-    for (k, weight) in problem.prior_weights().into_iter().enumerate() {
+    for (k, weight) in weights.iter().enumerate() {
         hessian[(k, k)] += lambda * weight;
     }
-    Cholesky::new(hessian).map(|factor| factor.solve(&at.descent))
+    definite(&hessian, &weights).map(|factor| factor.solve(&at.descent))
+}
+
+/// Shares of the priors that are added until rounding leaves the equations positive definite, as they are without it: every
+/// parameter has a prior.
+const MORE_PRIOR: [f64; 6] = [0.0, 1e-4, 1e-2, 0.1, 1.0, 10.0];
+
+/// Cholesky factor of the data's and the priors' weight; `None` only where they are no numbers.
+fn definite(hessian: &DMatrix<f64>, prior_weights: &[f64]) -> Option<Cholesky<f64, Dyn>> {
+    MORE_PRIOR.into_iter().find_map(|share| {
+        let mut hessian = hessian.clone();
+        for (k, weight) in prior_weights.iter().enumerate() {
+            hessian[(k, k)] += share * (weight + 1e-12 * hessian[(k, k)].abs());
+        }
+        Cholesky::new(hessian).filter(|factor| factor.l_dirty().iter().all(|v| v.is_finite()))
+    })
 }
