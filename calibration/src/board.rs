@@ -1,5 +1,9 @@
 //! Camera calibration from pictures of a chessboard: what does not need OpenCV.
 
+mod outliers;
+
+pub use outliers::outlying_corners;
+
 use crate::description::{Camera, Plane};
 use nalgebra::{IsometryMatrix3, Point3, Rotation3, Translation3, UnitVector3, Vector2, Vector3};
 
@@ -75,6 +79,98 @@ impl BoardShape {
 pub struct BoardView {
     /// Corners in pixels, in the order of [`BoardShape::corners_mm`].
     pub corners_px: Vec<[f64; 2]>,
+    /// Numbers of the corners that do not count, ascending: something beside them (glare, a finger) moves what is read.
+    pub doubtful: Vec<usize>,
+}
+
+impl BoardView {
+    /// A view of which every corner counts.
+    pub fn new(corners_px: Vec<[f64; 2]>) -> Self {
+        Self { corners_px, doubtful: Vec::new() }
+    }
+
+    /// Whether corner `k` counts.
+    pub fn counts(&self, k: usize) -> bool {
+        self.doubtful.binary_search(&k).is_err()
+    }
+
+    /// The mean of views of a board that lay still. A corner counts where it does in any of them.
+    pub fn mean(views: &[&Self]) -> Self {
+        let corners = views.first().map_or(0, |view| view.corners_px.len());
+        let (mut corners_px, mut doubtful) = (Vec::new(), Vec::new());
+        for k in 0..corners {
+            let mut counted: Vec<&&Self> = views.iter().filter(|view| view.counts(k)).collect();
+            if counted.is_empty() {
+                doubtful.push(k);
+                counted = views.iter().collect();
+            }
+            let sum = counted.iter().fold([0.0; 2], |sum, view| {
+                [sum[0] + view.corners_px[k][0], sum[1] + view.corners_px[k][1]]
+            });
+            corners_px.push(sum.map(|c| c / counted.len() as f64));
+        }
+        Self { corners_px, doubtful }
+    }
+}
+
+/// Why a board was not found.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NoBoard {
+    /// Nothing stands out from anything: black, white, or a sheet of paper.
+    NoContrast,
+    /// No edge is sharp.
+    Blurred,
+    /// Two rows or columns of corners look like anything.
+    TooSmall,
+    /// So many corners would lie nearer to each other than pixels allow.
+    TooFine,
+    /// Some of it is there, and it ends at the picture's edge: columns and rows that are seen.
+    CutOff([usize; 2]),
+    /// Some of it is there, and a highlight lies on the rest: columns and rows that are seen.
+    Glare([usize; 2]),
+    /// Some of it is there, the rest is not: columns and rows that are seen.
+    Covered([usize; 2]),
+    /// A board is there, of more columns or rows.
+    Larger([usize; 2]),
+    /// Its corners are there, too many of them out of line.
+    Crooked {
+        /// How many.
+        corners: usize,
+    },
+    /// Nothing like a board.
+    Nothing,
+}
+
+impl std::fmt::Display for NoBoard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoContrast => {
+                write!(f, "the picture has no contrast: dark, overexposed, or nothing in it")
+            }
+            Self::Blurred => write!(f, "the picture is blurred"),
+            Self::TooSmall => write!(f, "a board needs 3 x 3 inner corners at least"),
+            Self::TooFine => write!(f, "its squares would be smaller than a few pixels"),
+            Self::CutOff([columns, rows]) => write!(
+                f,
+                "the board is cut off by the edge of the picture ({columns} x {rows} corners are seen)"
+            ),
+            Self::Glare([columns, rows]) => {
+                write!(f, "glare covers a part of the board ({columns} x {rows} corners are seen)")
+            }
+            Self::Covered([columns, rows]) => write!(
+                f,
+                "a part of the board is covered or badly lit ({columns} x {rows} corners are seen)"
+            ),
+            Self::Larger([columns, rows]) => {
+                write!(f, "it shows a board of {columns} x {rows} inner corners")
+            }
+            Self::Crooked { corners } => write!(
+                f,
+                "{corners} corners are out of line: glare beside them, a bent board, or blur"
+            ),
+            Self::Nothing => write!(f, "there is no board in it, or too little of it"),
+        }
+    }
 }
 
 /// A camera fitted to views of the board.
@@ -226,11 +322,15 @@ pub fn plane_of_board(rig_from_board: &IsometryMatrix3<f64>) -> Plane {
 /// How many corners fell into each field of a grid over the picture, row by row.
 pub fn coverage(views: &[BoardView], size_px: [usize; 2], grid: [usize; 2]) -> Vec<usize> {
     let mut counts = vec![0; grid[0] * grid[1]];
-    for [u, v] in views.iter().flat_map(|view| &view.corners_px) {
+    let counted = |view: &BoardView| -> Vec<[f64; 2]> {
+        let all = view.corners_px.iter().enumerate();
+        all.filter(|(k, _)| view.counts(*k)).map(|(_, corner)| *corner).collect()
+    };
+    for [u, v] in views.iter().flat_map(counted) {
         let field = |at: f64, length: usize, fields: usize| {
             (((at + 0.5) / length as f64 * fields as f64).max(0.0) as usize).min(fields - 1)
         };
-        counts[field(*v, size_px[1], grid[1]) * grid[0] + field(*u, size_px[0], grid[0])] += 1;
+        counts[field(v, size_px[1], grid[1]) * grid[0] + field(u, size_px[0], grid[0])] += 1;
     }
     counts
 }

@@ -3,7 +3,7 @@
 use super::CalibrateError;
 use crate::session::Board;
 use nalgebra::IsometryMatrix3;
-use weavelight_calibration::board::{BoardShape, BoardView, CameraFit, Dropped};
+use weavelight_calibration::board::{BoardShape, BoardView, CameraFit, Dropped, NoBoard};
 use weavelight_calibration::description::{Camera, Image};
 
 /// As the estimators know it.
@@ -32,8 +32,9 @@ mod with_opencv {
     pub(in crate::calibrate) fn detect(
         grey: &Image<f32>,
         shape: &BoardShape,
-    ) -> Result<Option<Corners>, CalibrateError> {
-        let found = chessboard::detect(grey, shape)?;
+        tick: &dyn Fn(),
+    ) -> Result<Result<Corners, NoBoard>, CalibrateError> {
+        let found = chessboard::detect(grey, shape, tick)?;
         Ok(found.map(|found| Corners { detected: found.detected, refined: found.refined }))
     }
 
@@ -75,7 +76,8 @@ mod without_opencv {
     pub(in crate::calibrate) fn detect(
         _grey: &Image<f32>,
         _shape: &BoardShape,
-    ) -> Result<Option<Corners>, CalibrateError> {
+        _tick: &dyn Fn(),
+    ) -> Result<Result<Corners, NoBoard>, CalibrateError> {
         Err(CalibrateError::NoChessboards)
     }
 

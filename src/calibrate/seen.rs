@@ -5,10 +5,10 @@ use super::boards::{self, Corners, shape_of};
 use super::camera::COVERAGE_GRID;
 use super::frames::grey_picture;
 use super::sheet::{Known, cell_side, observe, tilt_and_height};
-use super::{CalibrateError, Progress, lights};
+use super::{CalibrateError, Progress, inputs, lights};
 use crate::instrument::{Calibration, Rig};
 use crate::raw::Frame;
-use crate::session::{Board, Session};
+use crate::session::{Board, Kind};
 use std::path::Path;
 use weavelight_calibration::board::{LEAST_VIEWS, coverage};
 use weavelight_calibration::description::{Camera, Plane};
@@ -25,12 +25,17 @@ impl SeenBoard {
     }
 }
 
-/// Looks for a chessboard; `None` where it is not in the picture whole and sharp.
+/// Looks for a chessboard; `None` where it is not in the picture whole and sharp. `tick` is called every second or so, and may
+/// unwind to end the search.
 ///
 /// # Errors
 /// Where this build has no chessboard detection, or that fails.
-pub fn find_board(frame: &Frame, board: &Board) -> Result<Option<SeenBoard>, CalibrateError> {
-    Ok(boards::detect(&grey_picture(frame), &shape_of(board))?.map(SeenBoard))
+pub fn find_board(
+    frame: &Frame,
+    board: &Board,
+    tick: &dyn Fn(),
+) -> Result<Option<SeenBoard>, CalibrateError> {
+    Ok(boards::detect(&grey_picture(frame), &shape_of(board), tick)?.ok().map(SeenBoard))
 }
 
 /// How a set of pictures of the board stands.
@@ -97,7 +102,7 @@ pub fn look_at_sheet(
         defects: &known.defects,
         lights,
     };
-    let observed = observe(&Session::load(session)?, with, progress)?;
+    let observed = observe(&inputs::load(session, Kind::White)?, with, progress)?;
     let (tilt_deg, height_mm) = tilt_and_height(&observed.sheet.plane);
     Ok(SeenSheet {
         cells_px: observed.sheet.cells.iter().map(|cell| cell.pixel).collect(),

@@ -267,7 +267,8 @@ fn look(
             out.tick(0.7, texts::LOOKING);
             Ok(match &subject {
                 Subject::Board { board, .. } => {
-                    board_picture(&shot.frame, board, find_board(&shot.frame, board)?)
+                    let tick = || out.tick(0.7, texts::LOOKING);
+                    board_picture(&shot.frame, board, find_board(&shot.frame, board, &tick)?)
                 }
                 Subject::Grey { patches } => chart_picture(&shot.frame, patches, shot.advice),
                 _ => Picture::new(&shot.frame, Marks::None, shot.advice, true),
@@ -336,7 +337,7 @@ fn examine(task: Task, place: &Place, sheets: &mut Sheets, out: &Outbox) -> Resu
             let board = session.target.as_ref().and_then(|target| target.board);
             let (Some(entry), Some(board)) = (newest, board) else { return Ok(false) };
             let frame = read(&session, entry)?;
-            let seen = find_board(&frame, &board)?;
+            let seen = find_board(&frame, &board, &|| out.tick(0.9, texts::LOOKING))?;
             Ok(tell(board_picture(&frame, &board, seen)))
         }
     }
@@ -493,16 +494,17 @@ fn look_for_boards(
     let mut all = Vec::new();
     for (k, entry) in session.frames.iter().enumerate() {
         let (share, step) = (k as f64 / session.frames.len() as f64, texts::picture_of(k, session));
-        match stopped {
+        let tick = || match stopped {
             true => out.progress(share, &step, None),
             false => out.tick(share, &step),
-        }
+        };
+        tick();
         let hash = entry.sha256.clone().unwrap_or_default();
         let seen = match memory.seen.get(&hash) {
             Some(seen) => seen.clone(),
             // Without detection nothing is found; the wizard says what to build.
             None if !cfg!(feature = "opencv") => None,
-            None => find_board(&read(session, entry)?, &board)?,
+            None => find_board(&read(session, entry)?, &board, &tick)?,
         };
         memory.seen.insert(hash, seen.clone());
         all.push((entry.clone(), seen));
