@@ -2,6 +2,8 @@
 
 use super::boards::{self, Corners, shape_of};
 use super::frames::{check_size, grey_picture};
+use super::inputs::{check_out, fingerprint, load_all};
+use super::plausible::check_camera;
 use super::{CalibrateError, Inputs, Progress};
 use crate::files::{Provenance, begin_owned};
 use crate::instrument::{CAMERA_FILE, MeasuredCamera, Optics, Rig, write_camera};
@@ -9,7 +11,7 @@ use crate::session::{Board, FrameEntry, Kind, Session};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use weavelight_calibration::board::{BoardShape, BoardView, camera_on_table, coverage};
+use weavelight_calibration::board::{BoardShape, BoardView, NoBoard, camera_on_table, coverage};
 use weavelight_calibration::description::{Camera, Plane};
 
 /// What to calibrate from.
@@ -86,9 +88,9 @@ pub fn camera(
     progress: &Progress,
 ) -> Result<CameraReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    check_out(&options.out)?;
+    let sessions = load_all(&options.sessions, Kind::Board)?;
     let _lock = begin_owned(&options.out, "calibrate camera", &[CAMERA_FILE])?;
-    let sessions: Vec<Session> =
-        options.sessions.iter().map(|path| Session::load(path)).collect::<Result<_, _>>()?;
     let board = common_board(&sessions)?;
     let shape = shape_of(&board);
     let pictures: Vec<Picture> = sessions
@@ -97,17 +99,18 @@ pub fn camera(
         .collect();
     let size = [rig.camera.width_px, rig.camera.height_px];
     progress(0.0, "looking for the board");
-    let (found, optics): (Vec<Option<Corners>>, Vec<Optics>) =
-        find_all(&pictures, &shape, &options.rig, size, progress)?.into_iter().unzip();
-    if found.iter().all(Option::is_none) {
-        return Err(none_found(&pictures, &shape));
+    let looked = find_all(&pictures, &shape, &options.rig, size, progress)?;
+    let found = without_copies(&pictures, &looked);
+    if found.iter().all(Result::is_err) {
+        return Err(none_found(&pictures, &looked, &shape));
     }
     let table = table_picture(&pictures);
-    let used: Vec<usize> = (0..pictures.len()).filter(|k| found[*k].is_some()).collect();
-    let optics = one_optics(&pictures, &optics)?;
+    let used: Vec<usize> = (0..pictures.len()).filter(|k| found[*k].is_ok()).collect();
+    let optics = one_optics(&pictures, &looked)?;
     let views: Vec<Corners> = found.iter().flatten().cloned().collect();
     progress(0.8, "fitting the camera");
     let (fit, kept, dropped) = boards::fit(&views, &shape, size)?;
+    check_camera(&sessions[0].manifest_path(), &fit, size)?;
     let pictures_kept: Vec<usize> = kept.iter().map(|view| used[*view]).collect();
     let Some(table_view) = pictures_kept.iter().position(|k| *k == table) else {
         let what =
@@ -118,7 +121,8 @@ pub fn camera(
     };
     let plane = pictures[table].session.plane.clone().unwrap_or_else(Plane::table);
     let camera = camera_on_table(&fit, table_view, &plane, size);
-    let mut boards: Vec<BoardReport> = pictures.iter().map(not_found).collect();
+    let mut boards: Vec<BoardReport> =
+        pictures.iter().zip(&found).map(|(picture, found)| not_found(picture, found)).collect();
     for (view, rms) in kept.iter().zip(&fit.view_rms_px) {
         boards[used[*view]] =
             BoardReport { file: pictures[used[*view]].name(), rms_px: Some(*rms), dropped: None };
@@ -157,9 +161,6 @@ fn common_board(sessions: &[Session]) -> Result<Board, CalibrateError> {
     let mut common = None;
     for session in sessions {
         let place = session.manifest_path();
-        if session.kind != Kind::Board {
-            return Err(CalibrateError::WrongKind { session: place, expected: "board" });
-        }
         let Some(board) = session.target.as_ref().and_then(|target| target.board) else {
             let remedy =
                 "add board = { columns = ..., rows = ..., square_mm = ... } (inner corners)";
@@ -184,39 +185,63 @@ fn common_board(sessions: &[Session]) -> Result<Board, CalibrateError> {
     })
 }
 
+/// What was seen in one picture.
+struct Looked {
+    board: Result<Corners, NoBoard>,
+    optics: Optics,
+    fingerprint: u64,
+}
+
 fn find_all(
     pictures: &[Picture],
     shape: &BoardShape,
     rig: &Path,
     size: [usize; 2],
     progress: &Progress,
-) -> Result<Vec<(Option<Corners>, Optics)>, CalibrateError> {
+) -> Result<Vec<Looked>, CalibrateError> {
     let done = std::sync::atomic::AtomicUsize::new(0);
+    let tell = |done: usize| {
+        progress(0.8 * done as f64 / pictures.len() as f64, "looking for the board");
+    };
     pictures
         .par_iter()
         .with_max_len(1)
         .map(|picture| {
             let frame = picture.session.frame(picture.entry)?;
             check_size(&picture.path(), &frame, rig, size)?;
-            let view = boards::detect(&grey_picture(&frame), shape)?;
-            let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-            progress(0.8 * done as f64 / pictures.len() as f64, "looking for the board");
-            Ok((view, Optics::of(&frame.metadata)))
+            let tick = || tell(done.load(std::sync::atomic::Ordering::Relaxed));
+            let board = boards::detect(&grey_picture(&frame), shape, &tick)?;
+            tell(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
+            let optics = Optics::of(&frame.metadata);
+            Ok(Looked { board, optics, fingerprint: fingerprint(&frame) })
         })
         .collect()
 }
 
+/// The corners in every picture, or why there are none. A copy of an earlier picture does not count a second time.
+fn without_copies(pictures: &[Picture], looked: &[Looked]) -> Vec<Result<Corners, String>> {
+    let of_picture = |(k, one): (usize, &Looked)| {
+        let earlier = looked[..k].iter().position(|other| other.fingerprint == one.fingerprint);
+        let board = one.board.clone().map_err(|cause| cause.to_string())?;
+        match earlier {
+            Some(earlier) => Err(format!("it is the same picture as {}", pictures[earlier].name())),
+            None => Ok(board),
+        }
+    };
+    looked.iter().enumerate().map(of_picture).collect()
+}
+
 /// The camera and lens of all pictures, which must be one and the same.
-fn one_optics(pictures: &[Picture], optics: &[Optics]) -> Result<Optics, CalibrateError> {
-    let Some(first) = optics.first() else { return Ok(Optics::default()) };
-    for (picture, other) in pictures.iter().zip(optics) {
-        if let Some(what) = first.differences(other).first() {
+fn one_optics(pictures: &[Picture], looked: &[Looked]) -> Result<Optics, CalibrateError> {
+    let Some(first) = looked.first() else { return Ok(Optics::default()) };
+    for (picture, other) in pictures.iter().zip(looked) {
+        if let Some(what) = first.optics.differences(&other.optics).first() {
             let what = format!("{what} ({})", pictures[0].name());
             let remedy = "photograph all boards with one camera and lens at one focal length";
             return Err(CalibrateError::target(picture.path(), what, remedy));
         }
     }
-    Ok(first.clone())
+    Ok(first.optics.clone())
 }
 
 /// Radians to degrees; not known where the fit does not say.
@@ -225,31 +250,46 @@ fn pose_sigma(of_table: Option<&[f64; 6]>) -> [f64; 6] {
     std::array::from_fn(|k| if k < 3 { sigma[k].to_degrees() } else { sigma[k] })
 }
 
-/// Says whether another size would have been found.
-fn none_found(pictures: &[Picture], shape: &BoardShape) -> CalibrateError {
-    let place = pictures[0].session.manifest_path();
+/// Says what the first picture shows, and whether the board has another size than stated.
+fn none_found(pictures: &[Picture], looked: &[Looked], shape: &BoardShape) -> CalibrateError {
     let (columns, rows) = (shape.columns, shape.rows);
-    let what = format!("no picture shows a complete board of {columns} x {rows} inner corners");
-    let remedy = match other_size(&pictures[0], shape) {
-        Some([columns, rows]) => {
-            format!("{} shows one of {columns} x {rows}: correct columns and rows", pictures[0].name())
-        }
-        None => "check columns and rows (inner corners, one less than squares), and photograph the whole board, sharp and evenly lit".to_owned(),
+    let Some(first) = pictures.first() else {
+        let remedy = "photograph the board";
+        return CalibrateError::target(".", "no picture was given", remedy);
     };
-    CalibrateError::target(place, what, remedy)
+    let place = first.session.manifest_path();
+    let what = format!("no picture shows a complete board of {columns} x {rows} inner corners");
+    if let Some((k, [columns, rows])) = other_size(looked) {
+        let remedy = format!(
+            "{} shows one of {columns} x {rows}: correct columns and rows",
+            pictures[k].name()
+        );
+        return CalibrateError::target(place, what, remedy);
+    }
+    let causes = pictures.iter().zip(looked);
+    let cause =
+        causes.filter_map(|(picture, looked)| Some((picture, looked.board.as_ref().err()?)));
+    let cause = cause.map(|(picture, cause)| format!(" ({}: {cause})", picture.name())).next();
+    let cause = cause.unwrap_or_default();
+    let remedy = "check columns and rows (inner corners, one less than squares), and photograph the whole board, sharp and evenly lit";
+    CalibrateError::target(place, what + &cause, remedy)
 }
 
-fn other_size(picture: &Picture, shape: &BoardShape) -> Option<[usize; 2]> {
-    let grey = grey_picture(&picture.session.frame(picture.entry).ok()?);
-    let near = |n: usize| [n.wrapping_sub(1), n, n + 1];
-    let sizes = near(shape.columns).into_iter().flat_map(|c| near(shape.rows).map(|r| [c, r]));
-    let possible = sizes.filter(|size| size.iter().all(|n| (3..100).contains(n)));
-    let shows = |[columns, rows]: &[usize; 2]| {
-        let shape = BoardShape { columns: *columns, rows: *rows, ..*shape };
-        matches!(boards::detect(&grey, &shape), Ok(Some(_)))
-    };
-    // A smaller board is found within a larger one: the largest that is found is the board.
-    possible.filter(shows).max_by_key(|[columns, rows]| columns * rows)
+/// The first picture that shows a larger board, else the first of several that show one and the same smaller one whole.
+fn other_size(looked: &[Looked]) -> Option<(usize, [usize; 2])> {
+    let causes = || looked.iter().map(|looked| looked.board.as_ref().err()).enumerate();
+    let larger = causes().find_map(|(k, cause)| match cause? {
+        NoBoard::Larger(size) => Some((k, *size)),
+        _ => None,
+    });
+    let whole: Vec<(usize, [usize; 2])> = causes()
+        .filter_map(|(k, cause)| match cause? {
+            NoBoard::Covered(size) | NoBoard::Glare(size) => Some((k, *size)),
+            _ => None,
+        })
+        .collect();
+    let alike = whole.len() >= 2 && whole.iter().all(|(_, size)| *size == whole[0].1);
+    larger.or_else(|| whole.first().copied().filter(|_| alike))
 }
 
 /// The frame with `pose = "table"`, else the first one listed.
@@ -257,9 +297,8 @@ fn table_picture(pictures: &[Picture]) -> usize {
     pictures.iter().position(|p| p.entry.pose.as_deref() == Some("table")).unwrap_or(0)
 }
 
-fn not_found(picture: &Picture) -> BoardReport {
-    let dropped = "no complete board was found: cut off, covered, blurred or badly lit";
-    BoardReport { file: picture.name(), rms_px: None, dropped: Some(dropped.to_owned()) }
+fn not_found(picture: &Picture, found: &Result<Corners, String>) -> BoardReport {
+    BoardReport { file: picture.name(), rms_px: None, dropped: found.as_ref().err().cloned() }
 }
 
 fn outlier_report(picture: &Picture, rms_px: f64, typical_px: f64) -> BoardReport {

@@ -2,11 +2,12 @@
 //!
 //! A flat sheet alone proves nothing: gain maps make it read flat whatever the positions are. Tilted sheets tell.
 
+use super::inputs::{check_out, load_all};
 use super::sheet::{Known, observe, tilt_and_height};
 use super::{CalibrateError, Progress};
 use crate::files::{FileError, begin_owned, write_owned};
 use crate::instrument::Calibration;
-use crate::session::Session;
+use crate::session::Kind;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -96,12 +97,13 @@ pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport,
         sheets: Vec::new(),
         warnings: Vec::new(),
     };
-    for (k, path) in options.sessions.iter().enumerate() {
-        let session = Session::load(path)?;
+    options.out.as_deref().map_or(Ok(()), check_out)?;
+    let sessions = load_all(&options.sessions, Kind::White)?;
+    for (k, session) in sessions.iter().enumerate() {
         let part = |share: f64, what: &str| {
-            progress((k as f64 + share) / options.sessions.len() as f64, what);
+            progress((k as f64 + share) / sessions.len() as f64, what);
         };
-        let observed = observe(&session, known, &part)?;
+        let observed = observe(session, known, &part)?;
         report.warnings.extend(observed.warnings);
         let pose_deg = observed.sheet.pose_sigma.tilt_rad.to_degrees();
         if pose_deg > 0.5 * options.threshold_deg {

@@ -1,25 +1,21 @@
 //! `calibrate color`: levels, response, noise, white balance and colour from a grey or colour chart.
 
+use super::color_matrix::{color_patches, matrix};
 use super::frames::Levels;
+use super::inputs::{self, check_out};
 use super::lights::nominal_camera;
-use super::patches::{ChartFrame, ChartFrames, read_chart};
+use super::patches::{ChartFrame, ChartFrames, PatchStats, read_chart};
 use super::sheet::optics_warnings;
 use super::{CalibrateError, Inputs, Progress};
+use super::{levels as light_levels, plausible};
 use crate::files::{Provenance, begin_owned};
 use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, Color, DEFECTS_FILE, Defects, Noise, Optics, Rig,
-    RigLightPlace, write_color, write_defects,
+    write_color, write_defects,
 };
 use crate::session::{Kind, Patch, Session};
-use nalgebra::{Matrix3, Vector3};
-use palette::color_difference::Ciede2000;
-use palette::white_point::D50;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use weavelight_calibration::color::{ColorPatch, fit_color_matrix, lab_d50_from_linear_srgb};
-use weavelight_calibration::description::{Camera, Light, Plane, PointLight};
-use weavelight_calibration::irradiance::light_vector_in_rig;
-use weavelight_calibration::projection::Projector;
 use weavelight_calibration::response::{
     Reading, Response, Spread, fit_black, fit_noise, fit_response,
 };
@@ -69,12 +65,16 @@ pub struct ColorReport {
 }
 
 /// Everything the steps share.
-struct Chart {
-    session: Session,
-    patches: Vec<Patch>,
-    frames: Vec<ChartFrame>,
+pub(super) struct Chart {
+    pub(super) session: Session,
+    pub(super) patches: Vec<Patch>,
+    pub(super) frames: Vec<ChartFrame>,
     defects: Defects,
     lights: usize,
+    /// Of every frame, in the session's order.
+    fingerprints: Vec<u64>,
+    /// Where a file's exposure is not the manifest's.
+    other_exposure: Option<String>,
 }
 
 /// Calibrates levels, response, noise and colour and writes `color.toml` and `defects.toml`.
@@ -83,34 +83,42 @@ struct Chart {
 /// Where frames cannot be read, the chart is not where the capture session says, or files cannot be written.
 pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    check_out(&options.out)?;
     let _lock = begin_owned(&options.out, "calibrate color", &[COLOR_FILE, DEFECTS_FILE])?;
-    let chart = load(options, &rig, progress)?;
     let before = before(&options.out)?;
+    let chart = load(options, &rig, progress)?;
+    // By the files' own levels first: of a picture that is all white nothing else can be said.
+    check_usable(&chart, &levels(&chart, &Color::default()))?;
+    check_lit(&chart)?;
+    inputs::no_copies(&chart.session, &chart.fingerprints)?;
     let mut warnings = other_optics(&chart, before.as_ref());
+    warnings.extend(chart.other_exposure.clone());
     let (black, black_from) = black_level(&chart);
     let mut color = Color {
         black_level: Some(black),
-        saturation_level: Some(saturation_level(&chart)),
+        saturation_level: Some(saturation_level(&chart, &black)),
         ..Color::default()
     };
     let response = response(&chart, &levels(&chart, &color));
-    match &response {
-        Some(response) => color.response = response.coefficients.clone(),
-        None => warnings
-            .push("no light was taken at several exposures: linearity was not tested".to_owned()),
+    if let Some(response) = &response {
+        plausible::check_response(&chart.session.manifest_path(), response)?;
+        color.response = response.coefficients.clone();
     }
-    if let Some(response) = response.as_ref().filter(|response| response.coefficients.len() > 2) {
-        warnings.push(format!(
-            "the sensor departs from proportionality by {:.2} %; the response is corrected",
-            100.0 * response.deviation
-        ));
-    }
+    warnings.extend(response_warning(response.as_ref()));
     let levels = levels(&chart, &color);
+    check_usable(&chart, &levels)?;
     check_place(&chart, &levels)?;
     color.white_balance = (0..chart.lights)
         .map(|light| white_balance(&chart, &levels, light))
         .collect::<Result<_, _>>()?;
-    let noise = noise(&chart, &levels);
+    let measured = noise(&chart, &levels);
+    let noise = measured.filter(plausible::is_noise);
+    if measured.is_some() && noise.is_none() {
+        warnings.push(
+            "gain and read noise could not be measured: the patches' noise does not grow with their light"
+                .to_owned(),
+        );
+    }
     color.noise = noise.map(|(electrons_per_dn, read_noise_e)| Noise {
         electrons_per_dn,
         read_noise_e,
@@ -119,7 +127,16 @@ pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport,
     });
     let camera = before.and_then(|c| c.camera).or_else(|| nominal_camera(&rig));
     let colors = color_patches(&chart, &levels, &color.white_balance, &rig, camera.as_ref());
-    let (matrix, matrix_from, differences) = matrix(&chart, &colors);
+    let (matrix, matrix_from, differences) = match matrix(&chart, &colors) {
+        (Some(found), from, _) if !plausible::is_matrix(&found) => {
+            warnings.push(format!(
+                "the colour matrix from {} makes no sense and was left out; check the patches' lab_d50",
+                from.unwrap_or("the frames")
+            ));
+            (None, None, Vec::new())
+        }
+        found => found,
+    };
     color.camera_to_linear_srgb = matrix;
     let report = ColorReport {
         black_level: black,
@@ -147,6 +164,20 @@ pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport,
     Ok(report)
 }
 
+fn response_warning(response: Option<&Response>) -> Option<String> {
+    let Some(response) = response else {
+        return Some(
+            "no light was taken at several exposures: linearity was not tested".to_owned(),
+        );
+    };
+    (response.coefficients.len() > 2).then(|| {
+        format!(
+            "the sensor departs from proportionality by {:.2} %; the response is corrected",
+            100.0 * response.deviation
+        )
+    })
+}
+
 /// What the folder holds so far, if anything; a broken file is told before an hour of work is lost on it.
 fn before(out: &Path) -> Result<Option<Calibration>, CalibrateError> {
     let there = [CAMERA_FILE, COLOR_FILE].iter().any(|name| out.join(name).exists());
@@ -161,11 +192,8 @@ fn other_optics(chart: &Chart, before: Option<&Calibration>) -> Vec<String> {
 }
 
 fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart, CalibrateError> {
-    let session = Session::load(&options.session)?;
+    let session = inputs::load(&options.session, Kind::Grey)?;
     let place = session.manifest_path();
-    if session.kind != Kind::Grey {
-        return Err(CalibrateError::WrongKind { session: place, expected: "grey" });
-    }
     session.check_lights(rig.lights.len())?;
     let patches = session.target.as_ref().map(|target| target.patches.clone()).unwrap_or_default();
     if patches.is_empty() {
@@ -184,7 +212,8 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
         ));
     }
     progress(0.1, "reading the chart");
-    let ChartFrames { frames, defects } = read_chart(&session, &patches)?;
+    let ChartFrames { frames, defects, fingerprints, other_exposure } =
+        read_chart(&session, &patches)?;
     let size = [rig.camera.width_px, rig.camera.height_px];
     if let Some(k) = frames.iter().position(|frame| frame.size != size) {
         let (frame, rig) = (session.frame_path(&session.frames[k]), options.rig.clone());
@@ -195,7 +224,8 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
             expected: size,
         });
     }
-    Ok(Chart { session, patches, frames, defects, lights: rig.lights.len() })
+    let lights = rig.lights.len();
+    Ok(Chart { session, patches, frames, defects, lights, fingerprints, other_exposure })
 }
 
 fn levels(chart: &Chart, color: &Color) -> Levels {
@@ -226,7 +256,7 @@ fn black_level(chart: &Chart) -> ([f64; 4], &'static str) {
         .collect();
         fit_black(&readings)
             .filter(|[_, sigma]| *sigma < BLACK_SIGMA_SHARE * range)
-            .map(|[black, _]| black)
+            .and_then(|[black, _]| plausible::black(black, stated[place], range))
     };
     let fitted: Vec<f64> = (0..4).filter_map(of_place).collect();
     match <[f64; 4]>::try_from(fitted) {
@@ -257,7 +287,9 @@ fn black_of_ambient(chart: &Chart, range: f64) -> Option<[f64; 4]> {
         }
         let dark = readings.iter().all(|r| r.value - stated[place] < AMBIENT_SHARE * range);
         let found = fit_black(&readings).filter(|_| dark);
-        found.filter(|[_, sigma]| *sigma < BLACK_SIGMA_SHARE * range).map(|[black, _]| black)
+        found
+            .filter(|[_, sigma]| *sigma < BLACK_SIGMA_SHARE * range)
+            .and_then(|[black, _]| plausible::black(black, stated[place], range))
     };
     let found: Vec<f64> = (0..4).filter_map(of_place).collect();
     found.try_into().ok()
@@ -284,14 +316,51 @@ fn series(
     readings
 }
 
+/// Samples that pile up below this share of the range have not reached the sensor's ceiling: they are dark.
+const CEILING_SHARE: f64 = 0.05;
+
 /// The frames' own white level, unless the samples pile up below it.
-fn saturation_level(chart: &Chart) -> f64 {
+fn saturation_level(chart: &Chart, black: &[f64; 4]) -> f64 {
     let stated = chart.frames[0].saturation.iter().copied().fold(f32::INFINITY, f32::min);
+    let darkest = black.iter().copied().fold(0.0, f64::max);
+    let least = darkest + CEILING_SHARE * (f64::from(stated) - darkest);
     let highest = chart.frames.iter().map(|frame| frame.top.0).fold(0.0, f64::max);
     let piled: usize =
         chart.frames.iter().filter(|frame| frame.top.0 == highest).map(|frame| frame.top.1).sum();
     let samples = chart.frames[0].size[0] * chart.frames[0].size[1];
-    if piled > samples / 2000 && highest < f64::from(stated) { highest } else { f64::from(stated) }
+    let ceiling = highest > least && highest < f64::from(stated);
+    if piled > samples / 2000 && ceiling { highest } else { f64::from(stated) }
+}
+
+/// Some light must be there at all: of a black picture nobody can say that the chart lies elsewhere.
+fn check_lit(chart: &Chart) -> Result<(), CalibrateError> {
+    let brightest = |lit: bool| {
+        let frames = chart.frames.iter().filter(|frame| frame.light.is_some() == lit);
+        let share = |frame: &ChartFrame, stats: &PatchStats| {
+            let of_place = |k: usize| {
+                let black = f64::from(frame.black[k]);
+                (stats.mean[k] - black) / (f64::from(frame.saturation[k]) - black)
+            };
+            (0..4).map(of_place).filter(|v| v.is_finite()).fold(0.0, f64::max)
+        };
+        let shares = frames.flat_map(|frame| frame.patches.iter().map(|s| share(frame, s)));
+        shares.fold(0.0, f64::max)
+    };
+    let ambient = brightest(false);
+    light_levels::check_lit(&chart.session.manifest_path(), brightest(true) - ambient, ambient)
+}
+
+/// Under every light some grey patch must be neither black nor clipped.
+fn check_usable(chart: &Chart, levels: &Levels) -> Result<(), CalibrateError> {
+    let greys: Vec<usize> =
+        (0..chart.patches.len()).filter(|k| neutral(&chart.patches[*k])).collect();
+    let clipped = |light: usize| {
+        !greys.is_empty() && greys.iter().all(|k| light_of(chart, levels, light, *k).is_none())
+    };
+    let Some(light) = (0..chart.lights).find(|light| clipped(*light)) else { return Ok(()) };
+    let what = format!("every grey patch is overexposed under light {light}");
+    let remedy = "shorten the exposure until the white patch reads 50-90 % of full scale, and photograph the chart again";
+    Err(CalibrateError::target(chart.session.manifest_path(), what, remedy))
 }
 
 fn response(chart: &Chart, levels: &Levels) -> Option<Response> {
@@ -313,7 +382,12 @@ fn response(chart: &Chart, levels: &Levels) -> Option<Response> {
 const STRAY: f64 = 1e-5;
 
 /// Light of a patch under a light per second at ISO 100, ambient light removed, per channel; clipped exposures do not count.
-fn light_of(chart: &Chart, levels: &Levels, light: usize, patch: usize) -> Option<[f64; 3]> {
+pub(super) fn light_of(
+    chart: &Chart,
+    levels: &Levels,
+    light: usize,
+    patch: usize,
+) -> Option<[f64; 3]> {
     let clean = |frame: &&ChartFrame| {
         frame.light == Some(light) && frame.light_in(patch, levels).iter().all(|v| v.is_finite())
     };
@@ -332,7 +406,7 @@ fn light_of(chart: &Chart, levels: &Levels, light: usize, patch: usize) -> Optio
 }
 
 /// Patches without colour: those that state none, or next to none.
-fn neutral(patch: &Patch) -> bool {
+pub(super) fn neutral(patch: &Patch) -> bool {
     patch.lab_d50.is_none_or(|[_, a, b]| a.hypot(b) < 3.0)
 }
 
@@ -344,7 +418,9 @@ fn white_balance(chart: &Chart, levels: &Levels, light: usize) -> Result<[f64; 3
         }
     }
     if sum.iter().all(|s| *s > 0.0) {
-        return Ok(sum.map(|s| sum[1] / s));
+        let gains = sum.map(|s| sum[1] / s);
+        plausible::check_white_balance(&chart.session.manifest_path(), light, gains)?;
+        return Ok(gains);
     }
     let what = format!("no grey patch is usable under light {light}: dark or overexposed");
     let remedy = "check the light, expose the white patch to 50-90 % of full scale, and photograph the chart again";
@@ -438,94 +514,6 @@ fn noise(chart: &Chart, levels: &Levels) -> Option<(f64, f64)> {
         }
     }
     fit_noise(&spreads).map(|noise| (noise.electrons_per_dn, noise.read_noise_e))
-}
-
-/// Colour patches as white-balanced camera RGB, the lights' shading over the chart divided out as far as the rig file and
-/// the camera know it.
-fn color_patches(
-    chart: &Chart,
-    levels: &Levels,
-    white_balance: &[[f64; 3]],
-    rig: &Rig,
-    camera: Option<&Camera>,
-) -> Vec<ColorPatch> {
-    let plane = chart.session.plane.clone().unwrap_or_else(Plane::table);
-    let place = |patch: &Patch| {
-        let [u0, v0, u1, v1] = patch.rect_px;
-        let centre = [(u0 + u1) / 2.0, (v0 + v1) / 2.0];
-        let seen = camera.and_then(|camera| Projector::new(camera).on_plane(centre, &plane));
-        (seen, seen.map_or(centre, |p| [p.x, p.y]))
-    };
-    let shade = |light: usize, patch: &Patch| {
-        let RigLightPlace::Point { position_mm, .. } = &rig.lights[light].place else { return 1.0 };
-        let Some(point) = place(patch).0 else { return 1.0 };
-        let axis = nalgebra::UnitVector3::new_normalize(-position_mm.coords);
-        let led =
-            PointLight { position_mm: *position_mm, axis, exponent: 1.0, intensity: [1.0; 3] };
-        light_vector_in_rig(&Light::Point(led), &point).dot(&plane.normal).max(1e-6)
-    };
-    let mean = |k: usize, patch: &Patch| -> Option<[f64; 3]> {
-        let mut sum = [0.0; 3];
-        for (light, gains) in white_balance.iter().enumerate() {
-            let value = light_of(chart, levels, light, k)?;
-            (0..3).for_each(|c| sum[c] += value[c] * gains[c] / shade(light, patch));
-        }
-        Some(sum)
-    };
-    let values: Vec<Option<[f64; 3]>> =
-        chart.patches.iter().enumerate().map(|(k, patch)| mean(k, patch)).collect();
-    // White is 1: from the grey patches.
-    let greys = chart.patches.iter().zip(&values).filter(|(patch, _)| neutral(patch));
-    let (light, reflectance) = greys.fold((0.0, 0.0), |(light, reflectance), (patch, value)| {
-        value.map_or((light, reflectance), |value| {
-            (light + value[1], reflectance + patch.reflectance)
-        })
-    });
-    let colored = chart.patches.iter().zip(&values).filter_map(|(patch, value)| {
-        let camera = value.map(|value| value.map(|v| v * reflectance / light))?;
-        Some(ColorPatch { camera, lab_d50: patch.lab_d50?, place: place(patch).1 })
-    });
-    colored.collect()
-}
-
-type MatrixFound = (Option<Matrix3<f64>>, Option<&'static str>, Vec<[f64; 2]>);
-
-/// From the chart's stated colours, else from the camera's own matrix.
-fn matrix(chart: &Chart, colors: &[ColorPatch]) -> MatrixFound {
-    if let Some(fit) = fit_color_matrix(colors) {
-        let difference = |(patch, illumination): (&ColorPatch, &f64)| {
-            let camera = Vector3::from(patch.camera) / *illumination;
-            [camera, fit.srgb_from_camera * camera]
-                .map(|rgb| ciede2000(lab_d50_from_linear_srgb(&rgb), patch.lab_d50))
-        };
-        let differences = colors.iter().zip(&fit.illumination).map(difference).collect();
-        return (Some(fit.srgb_from_camera), Some("the colour chart"), differences);
-    }
-    let own = chart.frames[0].metadata.camera_from_xyz.and_then(|rows| srgb_from_own_matrix(&rows));
-    (own, own.map(|_| "the camera's own matrix"), Vec::new())
-}
-
-fn ciede2000(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let lab = |[l, a, b]: [f64; 3]| palette::Lab::<D50, f64>::new(l, a, b);
-    lab(a).difference(lab(b))
-}
-
-/// Linear sRGB's primaries in XYZ under D65 (IEC 61966-2-1).
-const XYZ_FROM_SRGB: [[f64; 3]; 3] = [
-    [0.412_390_8, 0.357_584_3, 0.180_480_8],
-    [0.212_639_0, 0.715_168_7, 0.072_192_3],
-    [0.019_330_8, 0.119_194_8, 0.950_532_2],
-];
-
-/// The inverse of camera-from-sRGB with its rows scaled so that white is (1, 1, 1) in both.
-fn srgb_from_own_matrix(camera_from_xyz: &[[f64; 3]; 3]) -> Option<Matrix3<f64>> {
-    let rows = |rows: &[[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
-    let mut camera_from_srgb = rows(camera_from_xyz) * rows(&XYZ_FROM_SRGB);
-    for mut row in camera_from_srgb.row_iter_mut() {
-        let white = row.sum();
-        row /= white;
-    }
-    camera_from_srgb.try_inverse().filter(|matrix| matrix.iter().all(|v| v.is_finite()))
 }
 
 fn quality(report: &ColorReport) -> toml::Table {

@@ -1,13 +1,14 @@
 //! `calibrate lights`: every LED's position, beam and strength from white sheets.
 
+use super::inputs::{check_out, load_all, no_copied_sessions};
 use super::sheet::{Known, Observed, observe, tilt_and_height};
-use super::{CalibrateError, Inputs, Progress};
+use super::{CalibrateError, Inputs, Progress, plausible};
 use crate::files::{Input, Provenance, begin_owned, sha256_of_file};
 use crate::instrument::{
     CAMERA_FILE, CalibratedLight, Calibration, LIGHTS_FILE, Noise, Rig, RigLightPlace,
     update_color, write_lights,
 };
-use crate::session::Session;
+use crate::session::Kind;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -110,6 +111,7 @@ pub fn lights(
     progress: &Progress,
 ) -> Result<LightsReport, CalibrateError> {
     let rig = Rig::load(&options.rig)?;
+    check_out(&options.out)?;
     let _lock = begin_owned(&options.out, "calibrate lights", &[LIGHTS_FILE])?;
     let calibration = with_camera(&options.out)?;
     let Some(camera) = &calibration.camera else { return Err(no_camera(&options.out)) };
@@ -120,8 +122,8 @@ pub fn lights(
         defects: &calibration.defects,
         lights: rig.lights.len(),
     };
-    let sessions: Vec<Session> =
-        options.sessions.iter().map(|path| Session::load(path)).collect::<Result<_, _>>()?;
+    let sessions = load_all(&options.sessions, Kind::White)?;
+    let mut fingerprints = Vec::new();
     let mut warnings = Vec::new();
     let (mut sheets, mut brightest): (Vec<Sheet>, Vec<f64>) = (Vec::new(), Vec::new());
     for (k, session) in sessions.iter().enumerate() {
@@ -132,7 +134,9 @@ pub fn lights(
         warnings.extend(observed.warnings);
         sheets.push(observed.sheet);
         brightest.push(observed.brightest);
+        fingerprints.push(observed.fingerprints);
     }
+    no_copied_sessions(&sessions, &fingerprints)?;
     let priors = priors(&rig);
     check_poses(&sheets, &options.rig)?;
     check_wiring(&sheets, &priors, &options.rig)?;
@@ -148,6 +152,7 @@ pub fn lights(
         .enumerate()
         .map(|(i, light)| calibrated(light, &found, &priors[i], i))
         .collect();
+    plausible::check_lights(&options.rig, &calibrated)?;
     warnings.extend(light_warnings(&calibrated));
     let mut report = report(&sheets, &fitted, &found, &calibrated, &priors, fit_seconds, warnings);
     report.sheets.iter_mut().zip(&brightest).for_each(|(sheet, level)| sheet.brightest = *level);

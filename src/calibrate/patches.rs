@@ -3,6 +3,7 @@
 use super::CalibrateError;
 use super::defective;
 use super::frames::{Levels, raw_at, seconds_at_iso_100};
+use super::inputs::{exposure_warning, fingerprint};
 use crate::instrument::Defects;
 use crate::raw::{Frame, Layout, Metadata};
 use crate::session::{FrameEntry, Patch, Session};
@@ -40,6 +41,10 @@ pub(super) struct ChartFrame {
 pub(super) struct ChartFrames {
     pub(super) frames: Vec<ChartFrame>,
     pub(super) defects: Defects,
+    /// Of every frame, in the session's order.
+    pub(super) fingerprints: Vec<u64>,
+    /// Where a file's exposure is not the manifest's.
+    pub(super) other_exposure: Option<String>,
 }
 
 impl ChartFrame {
@@ -100,7 +105,11 @@ pub(super) fn read_chart(
         metadata: frame.metadata.clone(),
     };
     let frames = session.frames.par_iter().zip(&read).map(of_frame).collect();
-    Ok(ChartFrames { frames, defects })
+    let fingerprints = read.par_iter().map(|(frame, _)| fingerprint(frame)).collect();
+    let pairs = session.frames.iter().zip(&read);
+    let other_exposure =
+        pairs.filter_map(|(entry, (frame, _))| exposure_warning(session, entry, frame)).next();
+    Ok(ChartFrames { frames, defects, fingerprints, other_exposure })
 }
 
 /// Frames of two sizes have no photosites in common.

@@ -2,15 +2,18 @@
 
 use super::boards::{self, shape_of};
 use super::frames::{Levels, Mean, Rect, check_size, grey_picture, mean_in, seconds_at_iso_100};
+use super::inputs::{exposure_warning, fingerprint, no_copies};
+use super::levels;
 use super::moved::Pattern;
+use super::sheet_pose::{Pose, pose_of};
 use super::{CalibrateError, Progress};
 use crate::instrument::{CAMERA_FILE, Color, Defects, Optics};
-use crate::session::{FrameEntry, Kind, Session};
-use nalgebra::{IsometryMatrix3, Vector3};
+use crate::session::{Board, FrameEntry, Session};
+use nalgebra::Vector3;
 use rayon::prelude::*;
-use weavelight_calibration::board::{BoardShape, BoardView, plane_of_board};
+use weavelight_calibration::board::BoardView;
 use weavelight_calibration::description::{Camera, Plane};
-use weavelight_calibration::lights::{Cell, PoseSigma, Sample, Sheet};
+use weavelight_calibration::lights::{Cell, Sample, Sheet};
 use weavelight_calibration::projection::Projector;
 
 /// Cells across the longer side of the frame.
@@ -49,6 +52,8 @@ pub(super) struct Observed {
     pub(super) warnings: Vec<String>,
     /// Share of full scale that the brightest light's brightest cells reach.
     pub(super) brightest: f64,
+    /// Of every frame, in the session's order.
+    pub(super) fingerprints: Vec<u64>,
 }
 
 /// One frame, averaged.
@@ -60,14 +65,9 @@ struct Averaged {
     pattern: Pattern,
     board: Option<BoardView>,
     optics: Optics,
-}
-
-/// Where the sheet lay, and the strip on it.
-struct Pose {
-    plane: Plane,
-    sigma: PoseSigma,
-    strip: Option<(IsometryMatrix3<f64>, BoardShape)>,
-    warning: Option<String>,
+    fingerprint: u64,
+    /// Where the file's exposure is not the manifest's.
+    other_exposure: Option<String>,
 }
 
 /// Reads a white sheet's frames. Sheets whose lights are swapped, dead or overexposed are refused with the light's name.
@@ -80,24 +80,28 @@ pub(super) fn observe(
     progress: &Progress,
 ) -> Result<Observed, CalibrateError> {
     let Known { camera, lights, .. } = known;
-    let place = session.manifest_path();
-    if session.kind != Kind::White {
-        return Err(CalibrateError::WrongKind { session: place, expected: "white" });
-    }
     session.check_lights(lights)?;
     let rects = grid(camera);
     let frames = average_all(session, known, &rects, progress)?;
-    still(session, &frames)?;
     let exposures = Exposures { session, lights, frames: &frames, ambient: ambient(&frames) };
     // Before anything is looked for in the pictures: a strip on an overexposed sheet is not found either.
     exposures.check_complete()?;
     exposures.check_saturation(rects.len())?;
-    let pose = pose_of(session, camera, &frames)?;
+    exposures.check_lit(rects.len())?;
+    exposures.check_levels(&(0..rects.len()).collect::<Vec<_>>())?;
+    let fingerprints: Vec<u64> = frames.iter().map(|frame| frame.fingerprint).collect();
+    no_copies(session, &fingerprints)?;
+    exposures.check_exposures(rects.len())?;
+    still(session, &frames)?;
+    let strips: Vec<&BoardView> = frames.iter().filter_map(|frame| frame.board.as_ref()).collect();
+    let pose = pose_of(session, camera, &strips)?;
     let cells = cells_on(camera, &pose, &rects, grid_size(camera));
     let mut warnings = optics_warnings(session, known.optics, frames.iter().map(|f| &f.optics));
+    warnings.extend(frames.iter().find_map(|frame| frame.other_exposure.clone()));
     warnings.extend(pose.warning.iter().cloned());
     let sheet_cells = exposures.cells_of_the_sheet(&cells)?;
-    let brightest = exposures.check_levels(&sheet_cells)?;
+    let numbers: Vec<usize> = sheet_cells.iter().map(|(k, _)| *k).collect();
+    let brightest = exposures.check_levels(&numbers)?;
     warnings.extend(exposure_advice(&session.name, brightest));
     exposures.check_drift(&sheet_cells, &mut warnings);
     let samples = sheet_cells
@@ -114,7 +118,7 @@ pub(super) fn observe(
         cells: sheet_cells.into_iter().map(|(_, cell)| cell).collect(),
         samples,
     };
-    Ok(Observed { sheet, warnings, brightest })
+    Ok(Observed { sheet, warnings, brightest, fingerprints })
 }
 
 pub(super) fn cell_side(camera: &Camera) -> usize {
@@ -145,7 +149,11 @@ fn average_all(
     let searched = frames_to_search(session);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let average = |(k, entry): (usize, &FrameEntry)| {
-        let averaged = average(session, entry, searched.contains(&k), known, rects)?;
+        let tick = || {
+            let done = done.load(std::sync::atomic::Ordering::Relaxed);
+            progress(done as f64 / session.frames.len() as f64, &session.name);
+        };
+        let averaged = average(session, entry, searched.contains(&k), known, rects, &tick)?;
         let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         progress(done as f64 / session.frames.len() as f64, &session.name);
         Ok(averaged)
@@ -170,22 +178,25 @@ fn average(
     searched: bool,
     known: Known,
     rects: &[Rect],
+    tick: &dyn Fn(),
 ) -> Result<Averaged, CalibrateError> {
     let frame = session.frame(entry)?;
     let size = [known.camera.width_px, known.camera.height_px];
     check_size(&session.frame_path(entry), &frame, std::path::Path::new(CAMERA_FILE), size)?;
     let levels = Levels::of(&frame, known.color);
     let board = session.target.as_ref().and_then(|target| target.board).filter(|_| searched);
-    let board =
-        board.map(|board| boards::detect(&grey_picture(&frame), &shape_of(&board))).transpose()?;
+    let look = |board: Board| boards::detect(&grey_picture(&frame), &shape_of(&board), tick);
+    let board = board.map(look).transpose()?;
     Ok(Averaged {
         light: entry.light,
         drift_check: entry.drift_check,
         exposure: seconds_at_iso_100(entry),
         cells: rects.iter().map(|rect| mean_in(&frame, &levels, known.defects, *rect)).collect(),
         pattern: Pattern::of(&frame),
-        board: board.flatten().map(|corners| corners.refined),
+        board: board.and_then(Result::ok).map(|corners| corners.refined),
         optics: Optics::of(&frame.metadata),
+        fingerprint: fingerprint(&frame),
+        other_exposure: exposure_warning(session, entry, &frame),
     })
 }
 
@@ -224,103 +235,6 @@ fn still(session: &Session, frames: &[Averaged]) -> Result<(), CalibrateError> {
     }
     Ok(())
 }
-
-fn pose_of(
-    session: &Session,
-    camera: &Camera,
-    frames: &[Averaged],
-) -> Result<Pose, CalibrateError> {
-    let board =
-        session.target.as_ref().and_then(|target| target.board).map(|board| shape_of(&board));
-    let strip = board.map(|shape| strip_pose(session, camera, frames, shape)).transpose()?;
-    let exact = PoseSigma::default();
-    Ok(match (&session.plane, strip) {
-        (Some(plane), None) => {
-            Pose { plane: plane.clone(), sigma: exact, strip: None, warning: None }
-        }
-        (None, None) => Pose { plane: Plane::table(), sigma: exact, strip: None, warning: None },
-        (Some(plane), Some((pose, shape, _))) => {
-            let found = plane_of_board(&pose);
-            let off = plane.normal.angle(&found.normal).to_degrees();
-            let warning = (off > STATED_TOLERANCE_DEG).then(|| {
-                format!("{}: the stated plane and the printed strip differ by {off:.1} degrees; the stated one is used", session.name)
-            });
-            Pose { plane: plane.clone(), sigma: exact, strip: Some((pose, shape)), warning }
-        }
-        (None, Some((pose, shape, sigma))) => {
-            let (plane, sigma) = lying_or_found(plane_of_board(&pose), sigma);
-            Pose { plane, sigma, strip: Some((pose, shape)), warning: None }
-        }
-    })
-}
-
-/// A sheet whose strip agrees with the table lies on it: a narrow strip tells height and tilt far worse than that.
-fn lying_or_found(found: Plane, sigma: PoseSigma) -> (Plane, PoseSigma) {
-    let (tilt_deg, height_mm) = tilt_and_height(&found);
-    let lies = tilt_deg < LYING_TILT_DEG + 3.0 * sigma.tilt_rad.to_degrees()
-        && tilt_deg < LYING_MOST_DEG
-        && height_mm.abs() < LYING_HEIGHT_MM + 3.0 * sigma.offset_mm;
-    if lies { (Plane::table(), PoseSigma::default()) } else { (found, sigma) }
-}
-
-/// What a sheet on the table may seem to be off by beyond its strip's sigma, and the tilt that is never taken for none.
-const LYING_TILT_DEG: f64 = 0.3;
-const LYING_MOST_DEG: f64 = 4.0;
-const LYING_HEIGHT_MM: f64 = 2.0;
-
-/// Stated plane and strip may differ by this much before a word is said.
-const STATED_TOLERANCE_DEG: f64 = 0.5;
-
-/// The strip's pose in the rig frame from its corners, averaged over the frames searched, and how well it is known.
-fn strip_pose(
-    session: &Session,
-    camera: &Camera,
-    frames: &[Averaged],
-    shape: BoardShape,
-) -> Result<(IsometryMatrix3<f64>, BoardShape, PoseSigma), CalibrateError> {
-    let views: Vec<&BoardView> = frames.iter().filter_map(|frame| frame.board.as_ref()).collect();
-    if views.is_empty() {
-        let what = format!(
-            "the printed strip of {} x {} inner corners was not found",
-            shape.columns, shape.rows
-        );
-        let remedy = "photograph the sheet with the whole strip in the picture and not overexposed, or correct [target] board";
-        return Err(CalibrateError::target(session.manifest_path(), what, remedy));
-    }
-    let mean = |k: usize| {
-        let sum = views.iter().fold([0.0; 2], |sum, view| {
-            [sum[0] + view.corners_px[k][0], sum[1] + view.corners_px[k][1]]
-        });
-        sum.map(|c| c / views.len() as f64)
-    };
-    let view = BoardView { corners_px: (0..shape.columns * shape.rows).map(mean).collect() };
-    let (camera_from_board, rms_px) = boards::pose(&view, &shape, camera)?;
-    let sigma = pose_sigma(&camera_from_board, &shape, camera, rms_px);
-    Ok((camera.camera_from_rig.inverse() * camera_from_board, shape, sigma))
-}
-
-/// A tilt by a moves a corner x from the middle by f a x^2 / z^2 pixels, a lift by dz by f x dz / z^2.
-fn pose_sigma(
-    camera_from_board: &IsometryMatrix3<f64>,
-    shape: &BoardShape,
-    camera: &Camera,
-    rms_px: f64,
-) -> PoseSigma {
-    let z2 = camera_from_board.translation.vector.z.powi(2);
-    let corners = shape.corners_mm();
-    let count = corners.len() as f64;
-    let fourth = |axis: usize| corners.iter().map(|p| p[axis].powi(4)).sum::<f64>();
-    let second: f64 = corners.iter().map(|p| p.x * p.x + p.y * p.y).sum();
-    let rms_px = rms_px.max(LEAST_CORNER_PX);
-    PoseSigma {
-        tilt_rad: rms_px * z2 / camera.fx / fourth(0).min(fourth(1)).sqrt(),
-        offset_mm: rms_px * z2 / camera.fx / second.sqrt()
-            + rms_px * z2 / camera.fx / (count * second).sqrt(),
-    }
-}
-
-/// No corner is known better than this, whatever the residuals say.
-const LEAST_CORNER_PX: f64 = 0.03;
 
 /// The cells whose centre sees the sheet's plane beside the strip.
 fn cells_on(camera: &Camera, pose: &Pose, rects: &[Rect], grid: [usize; 2]) -> Vec<(usize, Cell)> {
@@ -441,7 +355,7 @@ impl Exposures<'_> {
     }
 
     /// The level of the brightest light; a dead one is an error.
-    fn check_levels(&self, cells: &[(usize, Cell)]) -> Result<f64, CalibrateError> {
+    fn check_levels(&self, cells: &[usize]) -> Result<f64, CalibrateError> {
         let place = || self.session.manifest_path();
         let levels: Vec<f64> = (0..self.lights).map(|l| self.level(l, cells)).collect();
         let brightest = levels.iter().copied().fold(0.0, f64::max);
@@ -458,6 +372,42 @@ impl Exposures<'_> {
         Ok(brightest)
     }
 
+    /// Some light must be there at all: nothing can be said of a black picture, and least that it shows no sheet.
+    fn check_lit(&self, cells: usize) -> Result<(), CalibrateError> {
+        let cells: Vec<usize> = (0..cells).collect();
+        let brightest = (0..self.lights).map(|l| self.level(l, &cells)).fold(0.0, f64::max);
+        let ambient = self.frames.iter().filter(|frame| frame.light.is_none());
+        let ambient = ambient
+            .flat_map(|frame| frame.cells.iter().map(|cell| cell.value[1]))
+            .filter(|v| v.is_finite())
+            .fold(0.0, f64::max);
+        levels::check_lit(&self.session.manifest_path(), brightest, ambient)
+    }
+
+    /// Frames of one light at several exposures must agree on how bright it is.
+    fn check_exposures(&self, cells: usize) -> Result<(), CalibrateError> {
+        let entries = || self.frames.iter().zip(&self.session.frames);
+        for (k, (a, first)) in entries().enumerate() {
+            let others = entries().skip(k + 1).filter(|(b, _)| {
+                a.light.is_some() && b.light == a.light && !(a.drift_check || b.drift_check)
+            });
+            for (b, second) in others {
+                let clean = (0..cells).filter(|c| {
+                    a.cells[*c].saturated + b.cells[*c].saturated == 0.0
+                        && a.cells[*c].value[1].min(b.cells[*c].value[1]) > levels::LEAST_SIGNAL
+                });
+                let mut ratios: Vec<f64> =
+                    clean.map(|c| self.signal(b, c)[1] / self.signal(a, c)[1]).collect();
+                ratios.sort_unstable_by(f64::total_cmp);
+                let Some(ratio) = ratios.get(ratios.len() / 2).copied() else { continue };
+                let files = [&first.file, &second.file];
+                let place = self.session.manifest_path();
+                levels::check_agree(&place, files, b.exposure / a.exposure, ratio)?;
+            }
+        }
+        Ok(())
+    }
+
     fn check_saturation(&self, cells: usize) -> Result<(), CalibrateError> {
         for light in 0..self.lights {
             let share = |frame: &Averaged| {
@@ -465,7 +415,8 @@ impl Exposures<'_> {
             };
             let least = self.of_light(light).map(share).fold(f64::INFINITY, f64::min);
             if least > OVEREXPOSED {
-                let what = format!("light {light} overexposes {:.0} % of the sheet", 100.0 * least);
+                let what =
+                    format!("light {light} overexposes {:.0} % of the picture", 100.0 * least);
                 let remedy = "shorten the exposure until the brightest light reaches 50 to 90 % of full scale, and photograph this sheet again";
                 return Err(CalibrateError::target(self.session.manifest_path(), what, remedy));
             }
@@ -474,13 +425,11 @@ impl Exposures<'_> {
     }
 
     /// Share of full scale that a light's brightest cells reach (99th percentile) in its brightest frame.
-    fn level(&self, light: usize, cells: &[(usize, Cell)]) -> f64 {
+    fn level(&self, light: usize, cells: &[usize]) -> f64 {
         let of_frame = |frame: &Averaged| {
-            let ambient =
-                |k: usize| frame.cells[k].value[1] - self.signal(frame, k)[1] * frame.exposure;
             let mut values: Vec<f64> = cells
                 .iter()
-                .map(|(k, _)| frame.cells[*k].value[1] - ambient(*k))
+                .map(|k| self.signal(frame, *k)[1] * frame.exposure)
                 .filter(|v| v.is_finite())
                 .collect();
             values.sort_unstable_by(f64::total_cmp);

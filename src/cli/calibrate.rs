@@ -130,6 +130,11 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
             Ok(output(status_text(&status), &status, &[]))
         }
         What::Check { calibration, sessions, threshold_deg, out } => {
+            if !(*threshold_deg > 0.0 && *threshold_deg <= 90.0) {
+                return Err(Failure::call(
+                    "--threshold-deg is an angle above 0, 0.1 for a good rig",
+                ));
+            }
             let options = CheckOptions {
                 calibration: calibration.clone(),
                 sessions: sessions.clone(),

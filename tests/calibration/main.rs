@@ -10,8 +10,10 @@
 )]
 
 mod bench;
+mod boards;
 mod chain;
 mod effects;
 mod figures;
+mod inputs;
 mod mismatches;
 mod refusals;

@@ -1,11 +1,15 @@
 //! What is refused: which picture, why, what to photograph instead; and the old calibration stands as it was.
 
-use super::bench::{Bench, Picture, SIX_SHEETS, WHITE, edit};
+use super::bench::{Bench, Picture, WHITE, edit};
 use weavelight::calibrate::CalibrateError;
 use weavelight::simulate::{Options, Part};
 
 /// The message must hold these words in one or two lines, and no file of the old calibration may change.
-fn refused<T>(bench: &Bench, work: impl Fn(&Bench) -> Result<T, CalibrateError>, words: &[&str]) {
+pub fn refused<T>(
+    bench: &Bench,
+    work: impl Fn(&Bench) -> Result<T, CalibrateError>,
+    words: &[&str],
+) {
     bench.know_all();
     let before = bench.snapshot();
     assert!(before.len() >= 3);
@@ -38,7 +42,7 @@ fn flawed_sheets() {
     check_sheets(&flat, |o| o.flaws.dead = Some(5), as_is, &["light 5", "dark"]);
     let over = |o: &mut Options| o.flaws.exposure_factor = 4.0;
     check_sheets(&flat, over, as_is, &["overexposes", "exposure", "photograph this sheet again"]);
-    check_sheets(&["white-flat", "white-flat"], fine, as_is, &["same pose", "raised", "tilted"]);
+    check_sheets(&["white-flat", "white-flat"], fine, as_is, &["is given twice"]);
     let nine = |bench: &Bench| {
         edit(bench.rig("white-flat/session.toml"), |text| {
             text.replace("light = 9\n", "light = 8\n")
@@ -64,7 +68,8 @@ fn sheets_that_all_lie_alike() {
         o.targets.tilts = 1;
         o.targets.state_planes = false;
     });
-    refused(&bench, |bench| bench.lights(&SIX_SHEETS[..1].repeat(3)), &["all 3", "same pose"]);
+    let three = ["white-flat", "white-raised", "white-tilt-1"];
+    refused(&bench, |bench| bench.lights(&three), &["all 3", "same pose", "raised", "tilted"]);
 }
 
 /// Of six boards, the first on the table.
