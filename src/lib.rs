@@ -4,6 +4,8 @@
 //! come out. Folders are the architecture:
 //!
 //! - [`files`]: reading and writing that every format shares (TOML with places, hashes, whole-or-nothing outputs)
+//! - [`machine`]: threads and memory, as far as they are to be had
+//! - [`quantity`]: the range of every number by its unit
 //! - [`raster`]: float and integer pictures (EXR, PNG, TIFF, JPEG) in and out
 //! - [`raw`]: a frame as the sensor wrote it
 //! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
@@ -24,7 +26,9 @@ pub mod doctor;
 pub mod files;
 pub mod gpu;
 pub mod instrument;
+pub mod machine;
 pub mod photometry;
+pub mod quantity;
 pub mod raster;
 pub mod raw;
 pub mod report;

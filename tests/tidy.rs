@@ -160,6 +160,35 @@ fn rooms_use_only_the_rooms_below_them() {
     }
 }
 
+/// A named pipe makes a plain read wait for ever, `/dev/zero` makes it fill the memory.
+#[test]
+fn inputs_are_opened_in_one_place() {
+    let words = ["fs::read(", "fs::read_to_string(", "File::open(", "fs::copy(", "OpenOptions::"];
+    let mut found = Vec::new();
+    for file in
+        ["src", "app/src", "tether/src", "sim/src"].iter().flat_map(|f| files_below(f, "rs"))
+    {
+        let path = file.strip_prefix(root()).unwrap().to_owned();
+        let test = path.components().any(|part| part.as_os_str() == "tests")
+            || path.file_name().is_some_and(|name| name == "tests.rs");
+        if test || path.starts_with("src/files") {
+            continue;
+        }
+        let text = fs::read_to_string(&file).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        for (number, line) in code.lines().enumerate() {
+            if words.iter().any(|word| line.contains(word)) && !line.trim_start().starts_with("//")
+            {
+                found.push(format!("{}:{}: {}", path.display(), number + 1, line.trim()));
+            }
+        }
+    }
+    expect_none(
+        "read through files::{read_input, read_input_text, open_input, copy_input}",
+        &found,
+    );
+}
+
 #[test]
 fn the_kernels_do_no_input_or_output() {
     let words = ["std::fs", "std::io", "std::thread", "std::time", "rayon", "tracing::"];

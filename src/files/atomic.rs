@@ -1,15 +1,17 @@
 use super::FileError;
 use super::hidden::RANDOM;
+use super::input::what_else;
 use std::ffi::OsStr;
 use std::fs::{File, Permissions};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes a file so that it is there whole or not at all: beside its place first, flushed to the disk, then renamed.
 ///
 /// # Errors
 /// Where the folder cannot be written, or the disk is full; the old file, if any, is then as it was.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    let path = &real_target(path)?;
     let failed = |source| FileError::write(path, source);
     let folder = parent_of(path);
     let mut file = builder(path).tempfile_in(folder).map_err(failed)?;
@@ -18,6 +20,46 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     file.persist(path).map_err(|error| failed(error.error))?;
     sync_folder(folder);
     Ok(())
+}
+
+/// Where writing to `path` leads: renaming onto a link would replace the link, and onto a device the device.
+fn real_target(path: &Path) -> Result<PathBuf, FileError> {
+    let unwritable = |what| FileError::Unwritable { path: path.to_owned(), what };
+    if let Some(what) = special(path) {
+        return Err(unwritable(format!("it {what}; name a new file")));
+    }
+    match std::fs::symlink_metadata(path) {
+        Ok(found) if found.is_dir() => {
+            Err(unwritable("it is a folder; name a file in it".to_owned()))
+        }
+        Ok(found) if found.is_symlink() => {
+            std::fs::canonicalize(path).map_err(|source| FileError::write(path, source))
+        }
+        _ => Ok(path.to_owned()),
+    }
+}
+
+/// Sees that a folder to be written to later is not something else already: said before the work, not after it.
+///
+/// # Errors
+/// Where it is a file, a named pipe, a device, or a link to nowhere.
+pub fn check_output_folder(path: &Path) -> Result<(), FileError> {
+    let what = special(path).or_else(|| path.is_file().then(|| "is a file".to_owned()));
+    what.map_or(Ok(()), |what| Err(FileError::Occupied { path: path.to_owned(), what }))
+}
+
+/// What stands at `path`, if it is neither file nor folder, as in "is a named pipe"; links are followed.
+pub(super) fn special(path: &Path) -> Option<String> {
+    let itself = std::fs::symlink_metadata(path).ok()?;
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => None,
+        Ok(found) => what_else(&found).map(|what| format!("is {what}")),
+        Err(_) if itself.is_symlink() => {
+            let to = std::fs::read_link(path).unwrap_or_default();
+            Some(format!("is a link to {}, which is not there", to.display()))
+        }
+        Err(_) => None,
+    }
 }
 
 /// The folder a path is in; "." for a bare name.
@@ -93,6 +135,32 @@ mod tests {
         let path = folder.path().join("no/such/a.toml");
         let error = write_atomic(&path, b"one").unwrap_err().to_string();
         assert!(error.contains("a.toml"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn links_stay_and_devices_and_pipes_are_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("file"), "old").unwrap();
+        std::os::unix::fs::symlink(at("file"), at("link")).unwrap();
+        write_atomic(&at("link"), b"new").unwrap();
+        assert_eq!(std::fs::read(at("file")).unwrap(), b"new");
+        assert!(std::fs::symlink_metadata(at("link")).unwrap().is_symlink());
+
+        use rustix::fs::{CWD, FileType, Mode, mknodat};
+        mknodat(CWD, at("pipe"), FileType::Fifo, Mode::RUSR, 0).unwrap();
+        std::os::unix::fs::symlink("/no/such", at("nowhere")).unwrap();
+        std::os::unix::fs::symlink("/dev/null", at("device")).unwrap();
+        for (name, what) in [
+            ("pipe", "cannot be written: it is a named pipe; name a new file"),
+            ("nowhere", "it is a link to /no/such, which is not there"),
+            ("device", "it is a device"),
+            ("", "it is a folder"),
+        ] {
+            let error = write_atomic(&at(name), b"x").unwrap_err().to_string();
+            assert!(error.contains(what), "{error}");
+        }
     }
 
     #[cfg(unix)]

@@ -1,4 +1,5 @@
-use super::FileError;
+use super::{FileError, one_line, read_input_text};
+use crate::quantity::Problem;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ impl Document {
     /// # Errors
     /// Where it cannot be read or is not UTF-8.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::read(path, source))?;
+        let text = read_input_text(path).map_err(|source| FileError::read(path, source))?;
         Ok(Self::new(path, text))
     }
 
@@ -53,6 +54,11 @@ impl Document {
     /// An error about the value at `key`; `what` follows the key's name, as in "is -1; exposure times are positive".
     pub fn invalid(&self, key: &str, what: &str) -> FileError {
         self.error_at(self.line_of(key), format!("`{}` {what}", readable(key)))
+    }
+
+    /// [`Document::invalid`] for what a check found.
+    pub fn problem(&self, problem: &Problem) -> FileError {
+        self.invalid(&problem.key, &problem.what)
     }
 
     /// The line of a key, from 1; of the nearest table around it where it is absent.
@@ -115,7 +121,8 @@ impl Document {
     }
 
     fn error_at(&self, line: usize, what: String) -> FileError {
-        FileError::Invalid { path: self.path.clone(), line, what }
+        // Keys and values of the file may be in it, whatever they hold.
+        FileError::Invalid { path: self.path.clone(), line, what: one_line(&what, LONGEST_MESSAGE) }
     }
 
     fn line_at(&self, offset: usize) -> usize {
@@ -123,6 +130,10 @@ impl Document {
         1 + before.iter().filter(|byte| **byte == b'\n').count()
     }
 }
+
+/// Characters of a message, and of a key in it.
+const LONGEST_MESSAGE: usize = 400;
+const LONGEST_NAME: usize = 60;
 
 /// A table or a value: the root of a document is the one, everything in it the other.
 enum Node<'a, 'i> {
@@ -135,7 +146,7 @@ fn is_finite(number: &str) -> bool {
 }
 
 /// `frames.3.exposure_s` as a person writes it: `frames[3].exposure_s`.
-fn readable(key: &str) -> String {
+pub(super) fn readable(key: &str) -> String {
     let mut text = String::new();
     for part in key.split('.') {
         if part.parse::<usize>().is_ok() && !text.is_empty() {
@@ -143,7 +154,7 @@ fn readable(key: &str) -> String {
         } else {
             let dot = if text.is_empty() { "" } else { "." };
             text.push_str(dot);
-            text.push_str(part);
+            text.push_str(&one_line(part, LONGEST_NAME));
         }
     }
     text
@@ -214,6 +225,43 @@ mod tests {
         check("schema = 1\nsize = = 3", "a.toml:2: ");
         check("", "a.toml:1: has no `schema`");
         check("\u{0}\u{1}", "a.toml:1: ");
+    }
+
+    #[test]
+    fn keys_and_values_are_shown_shortened_and_harmless() {
+        let error = |text: String| {
+            Document::new(Path::new("a.toml"), text).parse::<Example>(1).unwrap_err().to_string()
+        };
+        let long = "k".repeat(100_000);
+        for text in [
+            format!("schema = 1\nsize = \"{long}\""),
+            format!("schema = 1\n{long} = 2"),
+            format!("schema = 1\n{long} = nan"),
+            "schema = 1\n\"\\u001b[2J\\u202e\" = nan".to_owned(),
+            "schema = 1\nsize = \"\\u001b[2J\\u202e\\n\"".to_owned(),
+        ] {
+            let found = error(text);
+            assert!(found.len() < 600 && found.starts_with("a.toml:2: "), "{found}");
+            assert!(!found.contains(['\u{1b}', '\u{202e}', '\n']), "{found}");
+        }
+    }
+
+    #[test]
+    fn deep_nesting_is_an_error() {
+        let deep = 100_000;
+        let dotted = vec!["a"; deep].join(".");
+        for text in [
+            format!("schema = 1\na = {}", "[".repeat(deep)),
+            format!("schema = 1\na = {}{}", "[".repeat(deep), "]".repeat(deep)),
+            format!("schema = 1\na = {}1{}", "{b=".repeat(deep), "}".repeat(deep)),
+            format!("schema = 1\n{dotted} = 1"),
+            format!("schema = 1\n[{dotted}]"),
+            format!("schema = 1\n[[{dotted}]]"),
+        ] {
+            let found = Document::new(Path::new("a.toml"), text).parse::<Example>(1);
+            let found = found.unwrap_err().to_string();
+            assert!(found.contains("a.toml:") && found.len() < 600, "{found}");
+        }
     }
 
     #[test]

@@ -1,4 +1,7 @@
+use super::document::readable;
+use super::input::Refused;
 use super::{LockError, shown};
+use crate::quantity::Problem;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -92,13 +95,23 @@ impl FileError {
         Self::Read { path: path.to_owned(), source }
     }
 
+    /// What a check found in something about to be written: the reader would refuse it.
+    pub fn unwritable(path: &Path, problem: &Problem) -> Self {
+        let what = format!("`{}` {}", readable(&problem.key), problem.what);
+        Self::Unwritable { path: path.to_owned(), what }
+    }
+
     /// An error from writing `path`.
     pub fn write(path: &Path, source: io::Error) -> Self {
         Self::Write { path: path.to_owned(), source }
     }
 }
 
-fn read_advice(source: &io::Error) -> String {
+/// Why a file was not read and what to do, to follow its name.
+pub(crate) fn read_advice(source: &io::Error) -> String {
+    if let Some(refused) = source.get_ref().and_then(|inner| inner.downcast_ref::<Refused>()) {
+        return refused.to_string();
+    }
     match source.kind() {
         io::ErrorKind::NotFound => "not found; check the path".to_owned(),
         io::ErrorKind::PermissionDenied => "may not be read; check its permissions".to_owned(),
@@ -131,6 +144,9 @@ fn write_advice(source: &io::Error) -> String {
         }
         io::ErrorKind::NotADirectory => {
             "a part of this path is a file, not a folder; choose another --out".to_owned()
+        }
+        io::ErrorKind::AlreadyExists => {
+            "something that is no folder has this name; choose another --out".to_owned()
         }
         _ => format!("cannot be written ({source}); check the disk or choose another --out"),
     }

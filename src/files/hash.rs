@@ -1,6 +1,5 @@
-use super::FileError;
+use super::{FileError, open_input};
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -15,7 +14,7 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 /// Where the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
     let failed = |source| FileError::read(path, source);
-    let mut file = File::open(path).map_err(failed)?;
+    let mut file = open_input(path).map_err(failed)?;
     let mut hasher = Sha256::new();
     let mut piece = vec![0u8; 1 << 16];
     loop {

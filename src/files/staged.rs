@@ -1,5 +1,5 @@
 use super::FileError;
-use super::atomic::{parent_of, sync_folder};
+use super::atomic::{parent_of, special, sync_folder};
 use super::exchange::exchange;
 use super::file_list::{FileList, LIST_FILE};
 use super::hidden::{PARTIAL, hidden_name};
@@ -162,10 +162,10 @@ fn absolute(target: &Path) -> Result<PathBuf, FileError> {
 }
 
 fn check_no_file(target: &Path) -> Result<(), FileError> {
+    if let Some(what) = special(target) {
+        return Err(occupied(target, what));
+    }
     match fs::symlink_metadata(target) {
-        Ok(found) if found.is_symlink() => {
-            Err(occupied(target, "is a link to something that is not there".to_owned()))
-        }
         Ok(found) if !found.is_dir() => Err(occupied(target, "is a file".to_owned())),
         Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
             Err(FileError::write(target, error))

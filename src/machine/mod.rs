@@ -1,0 +1,8 @@
+//! What the machine has to give: threads and memory. Asked before the work, so that a machine or a limit too small for it ends
+//! in a sentence, not in the middle of a picture.
+
+mod memory;
+mod threads;
+
+pub use memory::{NoMemory, available_bytes, check_memory};
+pub use threads::{Pool, spawn, start, thread_count};
