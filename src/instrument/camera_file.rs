@@ -1,8 +1,11 @@
 //! `camera.toml`: the keys of the format, to and from [`Camera`].
 
 use super::Optics;
-use super::rig_file::{check_positive, check_size};
 use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_owned_toml};
+use crate::quantity::{
+    CAMERA_HEIGHT_MM, DISTORTION, FOCAL_LENGTH_MM, FOCAL_LENGTH_PX, PLACE_MM, PRINCIPAL_POINT_PX,
+    Problem, REPROJECTION_PX, check_side,
+};
 use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -82,7 +85,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<Read>, FileError> {
 /// Writes `camera.toml` into a calibration folder, which is made where absent.
 ///
 /// # Errors
-/// Where it cannot be written, or a `camera.toml` stands there that is not as the program wrote it.
+/// Where it cannot be written, would not be read back, or a `camera.toml` stands there that is not as the program wrote it.
 pub fn write_camera(
     folder: &Path,
     measured: &MeasuredCamera,
@@ -109,20 +112,35 @@ pub fn write_camera(
         focal_length_mm: optics.focal_length_mm,
         provenance: provenance.into(),
     };
-    write_owned_toml(&folder.join(CAMERA_FILE), &file)
+    let path = folder.join(CAMERA_FILE);
+    check_numbers(&file).map_err(|problem| FileError::unwritable(&path, &problem))?;
+    write_owned_toml(&path, &file)
+}
+
+/// What readers and writers of the format ask of its numbers.
+fn check_numbers(file: &CameraFile) -> Result<(), Problem> {
+    check_side("width_px", file.width_px)?;
+    check_side("height_px", file.height_px)?;
+    FOCAL_LENGTH_PX.at("fx", file.fx)?;
+    FOCAL_LENGTH_PX.at("fy", file.fy)?;
+    PRINCIPAL_POINT_PX.at("cx", file.cx)?;
+    PRINCIPAL_POINT_PX.at("cy", file.cy)?;
+    DISTORTION.all_at("distortion", &file.distortion)?;
+    check_rotation(&file.rotation)?;
+    PLACE_MM.all_at("translation_mm", &file.translation_mm)?;
+    let ahead_mm = file.translation_mm[2];
+    if ahead_mm <= 0.0 {
+        let what = "puts the scan area behind the camera; its z must be positive";
+        return Err(Problem::new("translation_mm", what));
+    }
+    CAMERA_HEIGHT_MM.at("translation_mm.2", ahead_mm)?;
+    REPROJECTION_PX.maybe_at("rms_reprojection_px", file.rms_reprojection_px)?;
+    FOCAL_LENGTH_MM.maybe_at("focal_length_mm", file.focal_length_mm)
 }
 
 fn camera_from_file(document: &Document, file: &CameraFile) -> Result<Camera, FileError> {
-    check_size(document, "width_px", file.width_px)?;
-    check_size(document, "height_px", file.height_px)?;
-    check_positive(document, "fx", Some(file.fx))?;
-    check_positive(document, "fy", Some(file.fy))?;
-    check_positive(document, "focal_length_mm", file.focal_length_mm)?;
+    check_numbers(file).map_err(|problem| document.problem(&problem))?;
     let rotation = rotation_from_rows(document, &file.rotation)?;
-    if file.translation_mm[2] <= 0.0 {
-        let what = "puts the scan area behind the camera; its z must be positive";
-        return Err(document.invalid("translation_mm", what));
-    }
     let translation = Translation3::from(Vector3::from(file.translation_mm));
     Ok(Camera {
         width_px: file.width_px,
@@ -141,16 +159,7 @@ fn rotation_from_rows(
     rows: &[[f64; 3]; 3],
 ) -> Result<Rotation3<f64>, FileError> {
     let stated = Matrix3::from(*rows).transpose();
-    let invalid = || {
-        document.invalid(
-            "rotation",
-            "is no rotation; its rows must be unit vectors at right angles, right-handed",
-        )
-    };
-    let off = (stated * stated.transpose() - Matrix3::identity()).abs().max();
-    if off > ROTATION_SLACK || stated.determinant() < 0.0 {
-        return Err(invalid());
-    }
+    let off = off_rotation(&stated);
     // Written with enough digits it is a rotation already and stays the same to the last bit.
     if off < 1e-14 {
         return Ok(Rotation3::from_matrix_unchecked(stated));
@@ -158,6 +167,23 @@ fn rotation_from_rows(
     let svd = stated.svd(true, true);
     match (svd.u, svd.v_t) {
         (Some(u), Some(v_t)) => Ok(Rotation3::from_matrix_unchecked(u * v_t)),
-        _ => Err(invalid()),
+        _ => Err(document.invalid("rotation", NO_ROTATION)),
     }
+}
+
+const NO_ROTATION: &str =
+    "is no rotation; its rows must be unit vectors at right angles, right-handed";
+
+fn check_rotation(rows: &[[f64; 3]; 3]) -> Result<(), Problem> {
+    let stated = Matrix3::from(*rows).transpose();
+    // Written so that NaN, of numbers whose squares overflow, is no rotation.
+    if off_rotation(&stated) <= ROTATION_SLACK && stated.determinant() > 0.0 {
+        return Ok(());
+    }
+    Err(Problem::new("rotation", NO_ROTATION))
+}
+
+/// How far a matrix is from a rotation.
+fn off_rotation(stated: &Matrix3<f64>) -> f64 {
+    (stated * stated.transpose() - Matrix3::identity()).abs().max()
 }

@@ -1,9 +1,12 @@
 //! `color.toml`: the keys of the format, to and from [`Color`].
 
-use super::rig_file::check_positive;
 use super::{Color, Noise};
 use crate::files::{
     Document, FileError, Provenance, ProvenanceTable, SCHEMA, update_owned_toml, write_owned_toml,
+};
+use crate::quantity::{
+    BLACK_DN, COLOR_MATRIX, ELECTRONS_PER_DN, KAPPA, Problem, READ_NOISE_E, SATURATION_DN,
+    WHITE_BALANCE, check_response,
 };
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -58,7 +61,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Color, Provenance)>, FileErr
     }
     let document = Document::read(&path)?;
     let file: ColorFile = document.parse(SCHEMA)?;
-    check(&document, &file)?;
+    check_numbers(&file).map_err(|problem| document.problem(&problem))?;
     let noise = |n: NoiseTable| Noise {
         electrons_per_dn: n.electrons_per_dn,
         read_noise_e: n.read_noise_e,
@@ -82,10 +85,12 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Color, Provenance)>, FileErr
 /// Writes `color.toml` into a calibration folder, which is made where absent.
 ///
 /// # Errors
-/// Where it cannot be written, or a `color.toml` stands there that is not as the program wrote it.
+/// Where it cannot be written, would not be read back, or a `color.toml` stands there that is not as the program wrote it.
 pub fn write_color(folder: &Path, color: &Color, provenance: &Provenance) -> Result<(), FileError> {
     std::fs::create_dir_all(folder).map_err(|source| FileError::write(folder, source))?;
-    write_owned_toml(&folder.join(COLOR_FILE), &file_of(color, provenance))
+    let (path, file) = (folder.join(COLOR_FILE), file_of(color, provenance));
+    check_numbers(&file).map_err(|problem| FileError::unwritable(&path, &problem))?;
+    write_owned_toml(&path, &file)
 }
 
 /// As [`write_color`], with what `color.toml` said but for what was measured since: it may have been edited.
@@ -97,7 +102,9 @@ pub fn update_color(
     color: &Color,
     provenance: &Provenance,
 ) -> Result<(), FileError> {
-    update_owned_toml(&folder.join(COLOR_FILE), &file_of(color, provenance))
+    let (path, file) = (folder.join(COLOR_FILE), file_of(color, provenance));
+    check_numbers(&file).map_err(|problem| FileError::unwritable(&path, &problem))?;
+    update_owned_toml(&path, &file)
 }
 
 fn file_of(color: &Color, provenance: &Provenance) -> ColorFile {
@@ -122,48 +129,40 @@ fn file_of(color: &Color, provenance: &Provenance) -> ColorFile {
     }
 }
 
-fn check(document: &Document, file: &ColorFile) -> Result<(), FileError> {
-    check_levels(document, file)?;
-    if !file.response.iter().skip(1).any(|c| *c != 0.0) {
-        let what = "does not depend on the signal; [0, 1] is linear, and the second coefficient belongs to x";
-        return Err(document.invalid("response", what));
-    }
+/// What readers and writers of the format ask of its numbers.
+fn check_numbers(file: &ColorFile) -> Result<(), Problem> {
+    check_levels(file)?;
+    check_response("response", &file.response)?;
     for (k, row) in file.camera_to_linear_srgb.iter().flatten().enumerate() {
+        let key = format!("camera_to_linear_srgb.{k}");
+        COLOR_MATRIX.all_at(&key, row)?;
         let sum: f64 = row.iter().sum();
         if (sum - 1.0).abs() > ROW_SUM_SLACK {
             let what = format!("sums to {sum}; rows sum to 1, so that white stays white");
-            return Err(document.invalid(&format!("camera_to_linear_srgb.{k}"), &what));
+            return Err(Problem::new(key, what));
         }
     }
     for (k, light) in file.lights.iter().enumerate() {
-        for gain in light.white_balance {
-            check_positive(document, &format!("lights.{k}.white_balance"), Some(gain))?;
-        }
+        WHITE_BALANCE.all_at(&format!("lights.{k}.white_balance"), &light.white_balance)?;
     }
-    file.noise.as_ref().map_or(Ok(()), |noise| check_noise(document, noise))
+    let Some(noise) = &file.noise else { return Ok(()) };
+    ELECTRONS_PER_DN.at("noise.electrons_per_dn", noise.electrons_per_dn)?;
+    READ_NOISE_E.at("noise.read_noise_e", noise.read_noise_e)?;
+    KAPPA.at("noise.kappa", noise.kappa)
 }
 
-fn check_levels(document: &Document, file: &ColorFile) -> Result<(), FileError> {
-    let darkest =
-        file.black_level.map(|levels| levels.into_iter().fold(f64::NEG_INFINITY, f64::max));
-    match (file.saturation_level, darkest) {
-        (Some(saturation), Some(black)) if saturation <= black => {
+fn check_levels(file: &ColorFile) -> Result<(), Problem> {
+    let levels = file.black_level.as_ref().map_or(&[][..], |levels| levels);
+    BLACK_DN.all_at("black_level", levels)?;
+    SATURATION_DN.maybe_at("saturation_level", file.saturation_level)?;
+    let darkest = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    match file.saturation_level {
+        Some(saturation) if saturation <= darkest => {
             let what = format!(
-                "is {saturation}, not above the black level {black}; both are raw numbers, black included"
+                "is {saturation}, not above the black level {darkest}; both are raw numbers, black included"
             );
-            Err(document.invalid("saturation_level", &what))
+            Err(Problem::new("saturation_level", what))
         }
-        (saturation, _) => check_positive(document, "saturation_level", saturation),
+        _ => Ok(()),
     }
-}
-
-fn check_noise(document: &Document, noise: &NoiseTable) -> Result<(), FileError> {
-    check_positive(document, "noise.electrons_per_dn", Some(noise.electrons_per_dn))?;
-    for (name, value) in [("read_noise_e", noise.read_noise_e), ("kappa", noise.kappa)] {
-        if value < 0.0 {
-            return Err(document
-                .invalid(&format!("noise.{name}"), &format!("is {value}; it cannot be negative")));
-        }
-    }
-    Ok(())
 }

@@ -1,14 +1,16 @@
 //! Gain maps as EXR pictures.
 
-use crate::files::FileError;
+use crate::files::{FileError, InputKind, read_input};
+use crate::quantity::GAIN;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
 use std::io::Cursor;
 use std::path::Path;
 use weavelight_calibration::description::Image;
 
-/// Reads a gain map: R, G, B, every value finite and positive.
+/// Reads a gain map: R, G, B, every value a gain.
 pub(super) fn read_gain_map(path: &Path) -> Result<Image<[f32; 3]>, FileError> {
-    let bytes = std::fs::read(path).map_err(|source| FileError::read(path, source))?;
+    let bytes =
+        read_input(path, InputKind::Picture).map_err(|source| FileError::read(path, source))?;
     let wrong = |what: String| {
         let remedy = "restore the file or run `weavelight calibrate lights` again";
         FileError::Content { path: path.to_owned(), what: format!("{what}; {remedy}") }
@@ -27,8 +29,8 @@ pub(super) fn read_gain_map(path: &Path) -> Result<Image<[f32; 3]>, FileError> {
         .from_buffered(Cursor::new(bytes))
         .map_err(|error| wrong(format!("is no RGB OpenEXR picture ({error})")))?;
     let map = picture.layer_data.channel_data.pixels;
-    match map.data.iter().flatten().find(|gain| !(gain.is_finite() && **gain > 0.0)) {
-        Some(gain) => Err(wrong(format!("holds the gain {gain}; gains are positive"))),
+    match map.data.iter().flatten().find_map(|gain| GAIN.check(f64::from(*gain)).err()) {
+        Some(what) => Err(wrong(format!("a gain of it {what}"))),
         None => Ok(map),
     }
 }
@@ -40,8 +42,9 @@ pub(super) fn encode_gain_map(
     map: &Image<[f32; 3]>,
 ) -> Result<Vec<u8>, FileError> {
     let unwritable = |what| FileError::Unwritable { path: folder.to_owned(), what };
+    let range = GAIN.range();
     if map.data.is_empty()
-        || map.data.iter().flatten().any(|gain| !(gain.is_finite() && *gain > 0.0))
+        || map.data.iter().flatten().any(|gain| !range.contains(&f64::from(*gain)))
     {
         return Err(unwritable(format!(
             "the gain map of light {light} has gains that are not positive"

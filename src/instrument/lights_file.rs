@@ -1,11 +1,13 @@
 //! `lights.toml`: the keys of the format, to and from [`CalibratedLight`].
 
 use super::gain_map::{encode_gain_map, read_gain_map};
-use super::rig_file::check_positive;
 use super::{CalibratedLight, LIGHT_COUNT};
 use crate::files::{
     Document, FileError, Provenance, ProvenanceTable, SCHEMA, inside_folder, remove_owned,
     sha256_hex, write_owned, write_owned_toml,
+};
+use crate::quantity::{
+    BEAM_EXPONENT, DIRECTION, INTENSITY, POSITION_SIGMA_MM, Problem, check_light_place,
 };
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -14,9 +16,6 @@ use weavelight_calibration::description::{DirectionalLight, Image, Light, PointL
 
 /// The file's name in a calibration folder.
 pub const LIGHTS_FILE: &str = "lights.toml";
-
-/// Intensities of any unit that a sensor could tell; beyond, quotients leave the range of float32.
-const INTENSITIES: std::ops::RangeInclusive<f64> = 1e-12..=1e12;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -59,14 +58,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Vec<CalibratedLight>, Proven
     }
     let document = Document::read(&path)?;
     let file: LightsFile = document.parse(SCHEMA)?;
-    let count = file.lights.len();
-    if !LIGHT_COUNT.contains(&count) {
-        let (least, most) = (LIGHT_COUNT.start(), LIGHT_COUNT.end());
-        return Err(document.invalid(
-            "lights",
-            &format!("are {count}; a normal needs {least} lights, and {most} is the most"),
-        ));
-    }
+    check_numbers(&file.lights).map_err(|problem| document.problem(&problem))?;
     let lights = file
         .lights
         .into_iter()
@@ -80,7 +72,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<(Vec<CalibratedLight>, Proven
 /// names of their own content, so that until the moment `lights.toml` is replaced the old one finds the old ones.
 ///
 /// # Errors
-/// Where something cannot be written, or is not as the program wrote it; the old calibration then stands.
+/// Where something cannot be written, would not be read back, or is not as the program wrote it; the old calibration then stands.
 pub fn write_lights(
     folder: &Path,
     lights: &[CalibratedLight],
@@ -92,9 +84,11 @@ pub fn write_lights(
         .enumerate()
         .map(|(k, light)| table_from_light(folder, k, light))
         .collect::<Result<Vec<_>, _>>()?;
+    let path = folder.join(LIGHTS_FILE);
+    check_numbers(&tables).map_err(|problem| FileError::unwritable(&path, &problem))?;
     let used: Vec<String> = tables.iter().filter_map(|table| table.gain_map.clone()).collect();
     write_owned_toml(
-        &folder.join(LIGHTS_FILE),
+        &path,
         &LightsFile { schema: SCHEMA, provenance: provenance.into(), lights: tables },
     )?;
     // Maps of an earlier calibration; somebody's own stay.
@@ -104,20 +98,44 @@ pub fn write_lights(
     })
 }
 
+/// What readers and writers of the format ask of its numbers.
+fn check_numbers(lights: &[LightTable]) -> Result<(), Problem> {
+    let count = lights.len();
+    if !LIGHT_COUNT.contains(&count) {
+        let (least, most) = (LIGHT_COUNT.start(), LIGHT_COUNT.end());
+        let what = format!("are {count}; a normal needs {least} lights, and {most} is the most");
+        return Err(Problem::new("lights", what));
+    }
+    lights.iter().enumerate().try_for_each(|(k, light)| check_light(&format!("lights.{k}"), light))
+}
+
+fn check_light(key: &str, light: &LightTable) -> Result<(), Problem> {
+    let key = |name: &str| format!("{key}.{name}");
+    if light.intensity.iter().any(|i| *i <= 0.0) {
+        let what = format!(
+            "is {:?}; every channel must be positive (a dead light is left out of the frames)",
+            light.intensity
+        );
+        return Err(Problem::new(key("intensity"), what));
+    }
+    INTENSITY.all_at(&key("intensity"), &light.intensity)?;
+    POSITION_SIGMA_MM.maybe_at(&key("position_sigma_mm"), light.position_sigma_mm)?;
+    BEAM_EXPONENT.maybe_at(&key("exponent"), light.exponent)?;
+    if let Some(position) = light.position_mm {
+        check_light_place(&key("position_mm"), position)?;
+    }
+    for (name, vector) in [("axis", &light.axis), ("direction", &light.direction)] {
+        DIRECTION.all_at(&key(name), vector.as_ref().map_or(&[][..], |vector| vector))?;
+    }
+    Ok(())
+}
+
 fn light_from_table(
     folder: &Path,
     document: &Document,
     key: &str,
     table: LightTable,
 ) -> Result<CalibratedLight, FileError> {
-    if table.intensity.iter().any(|i| !INTENSITIES.contains(i)) {
-        let what = format!(
-            "is {:?}; every channel must be positive (a dead light is left out of the frames)",
-            table.intensity
-        );
-        return Err(document.invalid(&format!("{key}.intensity"), &what));
-    }
-    check_positive(document, &format!("{key}.position_sigma_mm"), table.position_sigma_mm)?;
     let light = match table.kind {
         KindName::Point => Light::Point(point_light(document, key, &table)?),
         KindName::Directional => Light::Directional(directional_light(document, key, &table)?),
@@ -144,12 +162,6 @@ fn point_light(
         let what = "is a point light: it needs position_mm, axis, exponent and intensity, and no direction";
         return Err(document.invalid(key, what));
     };
-    if exponent < 0.0 {
-        return Err(document.invalid(
-            &format!("{key}.exponent"),
-            &format!("is {exponent}; it cannot be negative"),
-        ));
-    }
     Ok(PointLight {
         position_mm: Point3::from(position),
         axis: unit(document, &format!("{key}.axis"), axis)?,

@@ -10,6 +10,8 @@ mod lights_file;
 mod optics;
 mod rig_file;
 #[cfg(test)]
+mod round_trip;
+#[cfg(test)]
 mod tests;
 
 pub use calibration::CalibrationProvenance;

@@ -2,6 +2,10 @@
 
 use super::{CameraKind, Controller, LIGHT_COUNT, Rig, RigCamera, RigLight, RigLightPlace};
 use crate::files::{Document, FileError, SCHEMA, write_toml};
+use crate::quantity::{
+    CAMERA_HEIGHT_MM, DIRECTION, FOCAL_LENGTH_MM, PIXEL_PITCH_UM, POSITION_SIGMA_MM, Problem,
+    check_light_place, check_side, check_view,
+};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -91,9 +95,17 @@ impl Rig {
     /// Writes `rig.toml`, whole or not at all.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// Where it cannot be written, or would not be read back.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        write_toml(path, &file_from_rig(self))
+        if let CameraKind::Watched { folder } = &self.camera.kind
+            && folder.to_str().is_none()
+        {
+            let what = format!("is {}, which is not UTF-8; rename the folder", folder.display());
+            return Err(FileError::unwritable(path, &Problem::new("camera.folder", what)));
+        }
+        let file = file_from_rig(self);
+        check_numbers(&file).map_err(|problem| FileError::unwritable(path, &problem))?;
+        write_toml(path, &file)
     }
 
     /// The controller's output of a light.
@@ -109,15 +121,7 @@ fn channel_of(lights: &[RigLight], light: usize) -> u32 {
 
 fn rig_from_document(document: &Document) -> Result<Rig, FileError> {
     let file: RigFile = document.parse(SCHEMA)?;
-    let count = file.lights.len();
-    if !LIGHT_COUNT.contains(&count) {
-        let what = format!(
-            "are {count}; a rig has {} to {}, one [[lights]] each",
-            LIGHT_COUNT.start(),
-            LIGHT_COUNT.end()
-        );
-        return Err(document.invalid("lights", &what));
-    }
+    check_numbers(&file).map_err(|problem| document.problem(&problem))?;
     let lights = file
         .lights
         .iter()
@@ -128,26 +132,43 @@ fn rig_from_document(document: &Document) -> Result<Rig, FileError> {
     Ok(Rig {
         name: file.name.unwrap_or_else(|| "rig".to_owned()),
         camera: camera_from_table(document, file.camera)?,
-        controller: file
-            .controller
-            .map(|table| controller_from_table(document, table))
-            .transpose()?,
+        controller: file.controller.map(controller_from_table),
         lights,
     })
 }
 
-fn camera_from_table(document: &Document, table: CameraTable) -> Result<RigCamera, FileError> {
-    check_size(document, "camera.width_px", table.width_px)?;
-    check_size(document, "camera.height_px", table.height_px)?;
-    check_positive(document, "camera.focal_length_mm", table.focal_length_mm)?;
-    check_positive(document, "camera.pixel_pitch_um", table.pixel_pitch_um)?;
-    check_positive(document, "camera.height_mm", table.height_mm)?;
-    if table.port.is_some() && table.kind != CameraKindName::Tethered {
-        return Err(document.invalid(
-            "camera.port",
-            "belongs to kind = \"tethered\"; remove it or change the kind",
-        ));
+/// What readers and writers of the format ask of its numbers.
+fn check_numbers(file: &RigFile) -> Result<(), Problem> {
+    let (camera, count) = (&file.camera, file.lights.len());
+    if !LIGHT_COUNT.contains(&count) {
+        let (least, most) = (LIGHT_COUNT.start(), LIGHT_COUNT.end());
+        let what = format!("are {count}; a rig has {least} to {most}, one [[lights]] each");
+        return Err(Problem::new("lights", what));
     }
+    check_side("camera.width_px", camera.width_px)?;
+    check_side("camera.height_px", camera.height_px)?;
+    FOCAL_LENGTH_MM.maybe_at("camera.focal_length_mm", camera.focal_length_mm)?;
+    PIXEL_PITCH_UM.maybe_at("camera.pixel_pitch_um", camera.pixel_pitch_um)?;
+    CAMERA_HEIGHT_MM.maybe_at("camera.height_mm", camera.height_mm)?;
+    if let (Some(focal_mm), Some(pitch_um), Some(height_mm)) =
+        (camera.focal_length_mm, camera.pixel_pitch_um, camera.height_mm)
+    {
+        check_view("camera.pixel_pitch_um", camera.width_px, pitch_um, focal_mm, height_mm)?;
+    }
+    file.lights.iter().enumerate().try_for_each(|(k, light)| check_light(k, light))
+}
+
+fn check_light(k: usize, light: &LightTable) -> Result<(), Problem> {
+    if let Some(position) = light.position_mm {
+        check_light_place(&format!("lights.{k}.position_mm"), position)?;
+    }
+    POSITION_SIGMA_MM
+        .maybe_at(&format!("lights.{k}.position_sigma_mm"), light.position_sigma_mm)?;
+    let direction = light.direction.as_ref().map_or(&[][..], |direction| direction);
+    DIRECTION.all_at(&format!("lights.{k}.direction"), direction)
+}
+
+fn camera_from_table(document: &Document, table: CameraTable) -> Result<RigCamera, FileError> {
     let kind = match (table.kind, table.folder) {
         (CameraKindName::Watched, Some(folder)) => {
             CameraKind::Watched { folder: PathBuf::from(folder) }
@@ -156,14 +177,9 @@ fn camera_from_table(document: &Document, table: CameraTable) -> Result<RigCamer
             return Err(document
                 .invalid("camera.kind", "is \"watched\"; say which folder = \"...\" is watched"));
         }
-        (_, Some(_)) => {
-            return Err(document.invalid(
-                "camera.folder",
-                "belongs to kind = \"watched\"; remove it or change the kind",
-            ));
-        }
-        (CameraKindName::Tethered, None) => CameraKind::Tethered { port: table.port },
-        (CameraKindName::Simulated, None) => CameraKind::Simulated,
+        // Keys of another kind mean nothing here: they may wait for the day when the kind is changed back.
+        (CameraKindName::Tethered, _) => CameraKind::Tethered { port: table.port },
+        (CameraKindName::Simulated, _) => CameraKind::Simulated,
     };
     Ok(RigCamera {
         kind,
@@ -176,17 +192,11 @@ fn camera_from_table(document: &Document, table: CameraTable) -> Result<RigCamer
     })
 }
 
-fn controller_from_table(
-    document: &Document,
-    table: ControllerTable,
-) -> Result<Controller, FileError> {
-    match (table.kind, table.port) {
-        (ControllerKindName::Serial, port) => Ok(Controller::Serial { port }),
-        (ControllerKindName::Simulated, None) => Ok(Controller::Simulated),
-        (ControllerKindName::Simulated, Some(_)) => Err(document.invalid(
-            "controller.port",
-            "belongs to kind = \"serial\"; remove it or change the kind",
-        )),
+fn controller_from_table(table: ControllerTable) -> Controller {
+    match table.kind {
+        ControllerKindName::Serial => Controller::Serial { port: table.port },
+        // A port may wait for the day when the kind is changed back.
+        ControllerKindName::Simulated => Controller::Simulated,
     }
 }
 
@@ -196,9 +206,10 @@ fn light_from_table(
     table: &LightTable,
 ) -> Result<RigLight, FileError> {
     let place = match (table.kind, table.position_mm, table.direction) {
-        (LightKindName::Point, Some(position), None) => {
-            point_place(document, key, position, table.position_sigma_mm.unwrap_or(RULER_SIGMA_MM))?
-        }
+        (LightKindName::Point, Some(position), None) => RigLightPlace::Point {
+            position_mm: Point3::from(position),
+            position_sigma_mm: table.position_sigma_mm.unwrap_or(RULER_SIGMA_MM),
+        },
         (LightKindName::Directional, None, Some(direction))
             if table.position_sigma_mm.is_none() =>
         {
@@ -216,21 +227,6 @@ fn light_from_table(
         }
     };
     Ok(RigLight { channel: table.channel, place })
-}
-
-fn point_place(
-    document: &Document,
-    key: &str,
-    position: [f64; 3],
-    sigma_mm: f64,
-) -> Result<RigLightPlace, FileError> {
-    if position[2] <= 0.0 {
-        let what =
-            format!("has z = {}; the table is z = 0, so a light's z is positive", position[2]);
-        return Err(document.invalid(&format!("{key}.position_mm"), &what));
-    }
-    check_positive(document, &format!("{key}.position_sigma_mm"), Some(sigma_mm))?;
-    Ok(RigLightPlace::Point { position_mm: Point3::from(position), position_sigma_mm: sigma_mm })
 }
 
 fn direction_above(
@@ -259,29 +255,6 @@ fn check_channels(document: &Document, lights: &[RigLight]) -> Result<(), FileEr
         }
     }
     Ok(())
-}
-
-/// Frames larger than this are no camera's.
-const LARGEST_SIDE_PX: usize = 65_535;
-
-pub(super) fn check_size(document: &Document, key: &str, value: usize) -> Result<(), FileError> {
-    if (1..=LARGEST_SIDE_PX).contains(&value) {
-        return Ok(());
-    }
-    Err(document.invalid(key, &format!("is {value}; write the frame's size in pixels")))
-}
-
-pub(super) fn check_positive(
-    document: &Document,
-    key: &str,
-    value: Option<f64>,
-) -> Result<(), FileError> {
-    match value {
-        Some(value) if value <= 0.0 => {
-            Err(document.invalid(key, &format!("is {value}; it must be positive")))
-        }
-        _ => Ok(()),
-    }
 }
 
 fn file_from_rig(rig: &Rig) -> RigFile {

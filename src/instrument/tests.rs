@@ -38,11 +38,11 @@ const SMALLEST: &str = r#"schema = 1
 width_px = 64
 height_px = 48
 [[lights]]
-position_mm = [1, 0, 1]
+position_mm = [100, 0, 100]
 [[lights]]
-position_mm = [0, 1, 1]
+position_mm = [0, 100, 100]
 [[lights]]
-position_mm = [0, 0, 1]
+position_mm = [0, 0, 100]
 "#;
 
 fn rig(text: &str) -> Result<Rig, String> {
@@ -93,35 +93,68 @@ fn impossible_rigs_are_told_with_line_and_remedy() {
     check_rig("schema = 1", "schema = 3", "rig.toml:1: schema 3, but this version reads schema 1");
     check_rig("width_px = 64", "width_px = 0", "rig.toml:3: `camera.width_px` is 0");
     check_rig("width_px = 64", "", "rig.toml:2: missing field `width_px`");
-    check_rig("[1, 0, 1]", "[1, inf, 1]", "rig.toml:6: `lights[0].position_mm[1]` is inf");
-    check_rig("[1, 0, 1]", "[1, 0, -1]", "rig.toml:6: `lights[0].position_mm` has z = -1");
+    check_rig("[100, 0, 100]", "[1, inf, 1]", "rig.toml:6: `lights[0].position_mm[1]` is inf");
     check_rig(
-        "[[lights]]\nposition_mm = [0, 0, 1]\n",
+        "[100, 0, 100]",
+        "[100, 0, -1]",
+        "rig.toml:6: `lights[0].position_mm` is a place whose z is -1; lights above the table",
+    );
+    check_rig(
+        "[100, 0, 100]",
+        "[0.412, 0, 0.38]",
+        "rig.toml:6: `lights[0].position_mm` is a place whose distance is 0.560",
+    );
+    for (keys, expected) in [
+        (
+            "pixel_pitch_um = 0.00478",
+            "`camera.pixel_pitch_um` is 0.00478; pixels are 0.4 to 5000 micrometres: is this in millimetres?",
+        ),
+        ("pixel_pitch_um = 1e9", "`camera.pixel_pitch_um` is 1e9; pixels are"),
+        ("focal_length_mm = 1e30", "`camera.focal_length_mm` is 1e30; focal lengths are"),
+        (
+            "height_mm = 0.61",
+            "`camera.height_mm` is 0.61; cameras over the table are 5 to 20000 millimetres: is this in metres?",
+        ),
+        ("height_mm = -610", "`camera.height_mm` is -610; cameras"),
+    ] {
+        check_rig(
+            "height_px = 48",
+            &format!("height_px = 48\n{keys}"),
+            &format!("rig.toml:5: {expected}"),
+        );
+    }
+    check_rig(
+        "height_px = 48",
+        "height_px = 48\nfocal_length_mm = 1\nheight_mm = 20000\npixel_pitch_um = 1000",
+        "rig.toml:7: `camera.pixel_pitch_um` does not fit the rest",
+    );
+    check_rig(
+        "[[lights]]\nposition_mm = [0, 0, 100]\n",
         "",
         "rig.toml:5: `lights` are 2; a rig has 3 to 64",
     );
     check_rig(
-        "[0, 0, 1]\n",
-        "[0, 0, 1]\nchannel = 1\n",
+        "[0, 0, 100]\n",
+        "[0, 0, 100]\nchannel = 1\n",
         "rig.toml:9: `lights[2]` is on channel 1, as light 1 is",
     );
     check_rig(
-        "[0, 0, 1]\n",
-        "[0, 0, 1]\nposition_sigma_mm = 0\n",
+        "[0, 0, 100]\n",
+        "[0, 0, 100]\nposition_sigma_mm = 0\n",
         "rig.toml:11: `lights[2].position_sigma_mm` is 0",
     );
     check_rig(
-        "position_mm = [0, 0, 1]",
+        "position_mm = [0, 0, 100]",
         "direction = [0, 0, 1]",
         "rig.toml:9: `lights[2]` needs position_mm",
     );
     check_rig(
-        "position_mm = [0, 0, 1]",
+        "position_mm = [0, 0, 100]",
         "kind = \"directional\"",
         "rig.toml:9: `lights[2]` is directional: it needs direction",
     );
     check_rig(
-        "position_mm = [0, 0, 1]",
+        "position_mm = [0, 0, 100]",
         "kind = \"directional\"\ndirection = [0, 0, 0]",
         "rig.toml:11: `lights[2].direction` points away",
     );
@@ -130,10 +163,13 @@ fn impossible_rigs_are_told_with_line_and_remedy() {
         "height_px = 48\nkind = \"watched\"",
         "rig.toml:5: `camera.kind` is \"watched\"",
     );
+    // Keys of another kind are left alone.
+    check_rig("height_px = 48", "height_px = 48\nfolder = \"x\"", "fine");
+    check_rig("height_px = 48", "height_px = 48\nkind = \"simulated\"\nport = \"usb:1\"", "fine");
     check_rig(
-        "height_px = 48",
-        "height_px = 48\nfolder = \"x\"",
-        "rig.toml:5: `camera.folder` belongs to",
+        "[[lights]]\nposition_mm = [100",
+        "[controller]\nkind = \"simulated\"\nport = \"/dev/ttyACM0\"\n[[lights]]\nposition_mm = [100",
+        "fine",
     );
 }
 
@@ -326,7 +362,22 @@ fn impossible_colours_are_told() {
     };
     check("", "fine");
     check("response = [0, 1]", "fine");
-    check("response = [0.5]", "color.toml:2: `response` does not depend on the signal");
+    check("response = [0.5]", "color.toml:2: `response` needs 2 to 16 coefficients");
+    check(
+        "response = [0, 4e9]",
+        "color.toml:2: `response[1]` is 4e9; response coefficients are -100 to 100",
+    );
+    check("response = [0, -1]", "color.toml:2: `response` does not rise");
+    check("response = [0, 2, -2]", "color.toml:2: `response` does not rise");
+    check("response = [0, 0]", "color.toml:2: `response` does not rise");
+    check(
+        "black_level = [0, 0, 0, -1e30]",
+        "color.toml:2: `black_level[3]` is -1e30; black levels are",
+    );
+    check(
+        "camera_to_linear_srgb = [[1e300,-1e300,1],[0,1,0],[0,0,1]]",
+        "color.toml:2: `camera_to_linear_srgb[0][0]` is 1e300",
+    );
     check(
         "black_level = [600, 600, 600, 600]\nsaturation_level = 600",
         "color.toml:3: `saturation_level` is 600, not above",
@@ -335,7 +386,10 @@ fn impossible_colours_are_told() {
         "camera_to_linear_srgb = [[1,0,0],[0,2,0],[0,0,1]]",
         "color.toml:2: `camera_to_linear_srgb[1]` sums to 2",
     );
-    check("[[lights]]\nwhite_balance = [1, 1, 0]", "color.toml:3: `lights[0].white_balance` is 0");
+    check(
+        "[[lights]]\nwhite_balance = [1, 1, 0]",
+        "color.toml:3: `lights[0].white_balance[2]` is 0",
+    );
     check(
         "[noise]\nelectrons_per_dn = 1\nread_noise_e = -1",
         "color.toml:4: `noise.read_noise_e` is -1",

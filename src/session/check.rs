@@ -1,20 +1,24 @@
-//! What a manifest may say beyond its types: each problem as (key, what is wrong and what to do).
+//! What a manifest may say beyond its types: the first problem.
 
 use super::{Board, FrameEntry, Patch, Session};
 use crate::files::inside_folder;
+use crate::quantity::{
+    EXPOSURE_S, ISO, LAB_AB, LAB_L, PATCH_PX, Problem, REFLECTANCE, SQUARE_MM, SURFACE_MM,
+    check_corners,
+};
 use std::collections::HashMap;
 use std::path::Path;
-
-type Problem = (String, String);
+use weavelight_calibration::description::Plane;
 
 /// Everything that a manifest must satisfy whatever command reads it.
 pub(super) fn check_manifest(session: &Session) -> Result<(), Problem> {
     if let Some(mask) = &session.mask {
         check_path("mask", mask)?;
     }
+    session.plane.as_ref().map_or(Ok(()), check_plane)?;
     if let Some(target) = &session.target {
         if let Some(reflectance) = target.reflectance {
-            check_reflectance("target.reflectance", reflectance)?;
+            REFLECTANCE.at("target.reflectance", reflectance)?;
         }
         if let Some(board) = target.board {
             check_board(board)?;
@@ -32,7 +36,7 @@ pub(super) fn check_manifest(session: &Session) -> Result<(), Problem> {
                 "is {}, as in frames[{earlier}]; list every frame once",
                 frame.file.display()
             );
-            return problem(&format!("{key}.file"), what);
+            return Err(Problem::new(format!("{key}.file"), what));
         }
     }
     Ok(())
@@ -40,67 +44,44 @@ pub(super) fn check_manifest(session: &Session) -> Result<(), Problem> {
 
 fn check_frame(key: &str, frame: &FrameEntry) -> Result<(), Problem> {
     check_path(&format!("{key}.file"), &frame.file)?;
-    check_positive(
-        &format!("{key}.exposure_s"),
-        frame.exposure_s,
-        "exposure times are positive seconds",
-    )?;
-    check_positive(&format!("{key}.iso"), frame.iso, "sensitivities are positive, as in 100")?;
+    EXPOSURE_S.at(&format!("{key}.exposure_s"), frame.exposure_s)?;
+    ISO.at(&format!("{key}.iso"), frame.iso)?;
     match &frame.sha256 {
         Some(hash) if hash.len() != 64 || !hash.bytes().all(|byte| byte.is_ascii_hexdigit()) => {
-            problem(
-                &format!("{key}.sha256"),
-                "is no SHA-256; write its 64 hexadecimal digits or remove the key".into(),
-            )
+            let what = "is no SHA-256; write its 64 hexadecimal digits or remove the key";
+            Err(Problem::new(format!("{key}.sha256"), what))
         }
         _ => Ok(()),
     }
 }
 
 fn check_board(board: Board) -> Result<(), Problem> {
-    let counts = [("columns", board.columns), ("rows", board.rows)];
-    for (name, count) in counts {
-        if !(2..=1000).contains(&count) {
-            let what = format!("is {count}; count the inner corners, 2 at least");
-            return problem(&format!("target.board.{name}"), what);
-        }
-    }
-    check_positive(
-        "target.board.square_mm",
-        board.square_mm,
-        "the side of a square is positive millimetres",
-    )
+    check_corners("target.board.columns", board.columns)?;
+    check_corners("target.board.rows", board.rows)?;
+    SQUARE_MM.at("target.board.square_mm", board.square_mm)
 }
 
 fn check_patch(key: &str, patch: &Patch) -> Result<(), Problem> {
     let [u0, v0, u1, v1] = patch.rect_px;
-    if !(u0 >= 0.0 && v0 >= 0.0 && u0 < u1 && v0 < v1) {
+    PATCH_PX.all_at(&format!("{key}.rect_px"), &patch.rect_px)?;
+    if !(u0 < u1 && v0 < v1) {
         let what =
             format!("is [{u0}, {v0}, {u1}, {v1}]; write u0, v0, u1, v1 with u0 < u1 and v0 < v1");
-        return problem(&format!("{key}.rect_px"), what);
+        return Err(Problem::new(format!("{key}.rect_px"), what));
     }
-    check_reflectance(&format!("{key}.reflectance"), patch.reflectance)
+    if let Some([l, a, b]) = patch.lab_d50 {
+        let key = format!("{key}.lab_d50");
+        LAB_L.at(&format!("{key}.0"), l)?;
+        LAB_AB.at(&format!("{key}.1"), a)?;
+        LAB_AB.at(&format!("{key}.2"), b)?;
+    }
+    REFLECTANCE.at(&format!("{key}.reflectance"), patch.reflectance)
 }
 
-fn check_reflectance(key: &str, value: f64) -> Result<(), Problem> {
-    // Fluorescent paper may send back a little more than it gets in one channel.
-    if value > 0.0 && value <= 1.5 {
-        return Ok(());
-    }
-    problem(key, format!("is {value}; reflectances are above 0 and about 1 at most, 0.99 for 99 %"))
-}
-
-/// No exposure, sensitivity or length is farther from 1 than this; beyond, products leave the range of float32.
-const RANGE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
-
-fn check_positive(key: &str, value: f64, rule: &str) -> Result<(), Problem> {
-    if RANGE.contains(&value) { Ok(()) } else { problem(key, format!("is {value}; {rule}")) }
+fn check_plane(plane: &Plane) -> Result<(), Problem> {
+    SURFACE_MM.all_at("plane.point_mm", plane.point_mm.coords.as_slice())
 }
 
 fn check_path(key: &str, path: &Path) -> Result<(), Problem> {
-    inside_folder(&path.to_string_lossy()).map(drop).map_err(|what| (key.to_owned(), what))
-}
-
-fn problem(key: &str, what: String) -> Result<(), Problem> {
-    Err((key.to_owned(), what))
+    inside_folder(&path.to_string_lossy()).map(drop).map_err(|what| Problem::new(key, what))
 }

@@ -6,6 +6,7 @@ use crate::files::{
     Document, FileError, SCHEMA, datetime_from_timestamp, inside_folder, timestamp_from_datetime,
     write_toml,
 };
+use crate::quantity::DIRECTION;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -124,7 +125,7 @@ impl Target {
             target: Some(target_from_table(table)),
             ..Session::new("", Kind::Swatch, "")
         };
-        check_manifest(&session).map_err(|(key, what)| document.invalid(&key, &what))?;
+        check_manifest(&session).map_err(|problem| document.problem(&problem))?;
         Ok(session.target.unwrap_or_default())
     }
 }
@@ -159,10 +160,8 @@ impl Session {
 
     /// Whether what it says could be written and read back.
     pub(super) fn check(&self) -> Result<(), FileError> {
-        check_manifest(self).map_err(|(key, what)| FileError::Unwritable {
-            path: self.folder.join(MANIFEST),
-            what: format!("`{key}` {what}"),
-        })
+        check_manifest(self)
+            .map_err(|problem| FileError::unwritable(&self.folder.join(MANIFEST), &problem))
     }
 }
 
@@ -193,7 +192,7 @@ pub(super) fn session_from_manifest(
         frames,
         mask: manifest.mask.map(|name| inside(document, "mask", &name)).transpose()?,
     };
-    check_manifest(&session).map_err(|(key, what)| document.invalid(&key, &what))?;
+    check_manifest(&session).map_err(|problem| document.problem(&problem))?;
     Ok(session)
 }
 
@@ -255,6 +254,9 @@ fn moment(
 }
 
 fn plane_from_table(document: &Document, table: &PlaneTable) -> Result<Plane, FileError> {
+    DIRECTION
+        .all_at("plane.normal", &table.normal)
+        .map_err(|problem| document.problem(&problem))?;
     let normal = UnitVector3::try_new(Vector3::from(table.normal), 1e-9)
         .filter(|normal| normal.z > 0.0)
         .ok_or_else(|| {

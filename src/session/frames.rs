@@ -1,5 +1,5 @@
 use super::{Encoding, FrameEntry, MANIFEST, Session, SessionError};
-use crate::files::{FileError, sha256_hex};
+use crate::files::{FileError, InputKind, check_input, read_input, sha256_hex};
 use crate::raw::{self, Frame, Hint, ReadError, decode};
 use std::io;
 use std::path::PathBuf;
@@ -48,10 +48,11 @@ impl Session {
     /// Where the file is missing, unreadable or altered.
     pub fn read_frame(&self, frame: &FrameEntry) -> Result<Vec<u8>, SessionError> {
         let path = self.frame_path(frame);
-        let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => SessionError::FrameMissing { path: path.clone() },
-            _ => FileError::read(&path, source).into(),
-        })?;
+        let bytes =
+            read_input(&path, InputKind::Picture).map_err(|source| match source.kind() {
+                io::ErrorKind::NotFound => SessionError::FrameMissing { path: path.clone() },
+                _ => FileError::read(&path, source).into(),
+            })?;
         self.verify(frame, &bytes)?;
         Ok(bytes)
     }
@@ -78,9 +79,12 @@ impl Session {
     /// # Errors
     /// The first one, in the manifest's order, that is not.
     pub fn check_files(&self) -> Result<(), SessionError> {
-        let missing =
-            self.frames.iter().map(|frame| self.frame_path(frame)).find(|path| !path.is_file());
-        missing.map_or(Ok(()), |path| Err(SessionError::FrameMissing { path }))
+        self.frames.iter().map(|frame| self.frame_path(frame)).try_for_each(|path| {
+            check_input(&path).map_err(|source| match source.kind() {
+                io::ErrorKind::NotFound => SessionError::FrameMissing { path: path.clone() },
+                _ => FileError::read(&path, source).into(),
+            })
+        })
     }
 
     /// Sees that every frame is of a light below `count`.

@@ -150,6 +150,16 @@ fn impossible_manifests_are_told_with_line_and_remedy() {
         "[[frames]]\nfile = \"b.png\"\nexposure_s = 1e300\niso = 100\n",
         "S/session.toml:10: `frames[1].exposure_s` is 1",
     );
+    check(
+        HEAD,
+        "[[frames]]\nfile = \"b.png\"\nexposure_s = 1e-9\niso = 100\n",
+        "S/session.toml:10: `frames[1].exposure_s` is 1e-9; exposures are 0.000001 to 86400 seconds",
+    );
+    check(
+        HEAD,
+        "[[frames]]\nfile = \"b.png\"\nexposure_s = 1\niso = 0.1\n",
+        "S/session.toml:11: `frames[1].iso` is 0.1; sensitivities are 1 to 10000000 ISO",
+    );
     check(HEAD, FRAME, "S/session.toml:9: `frames[1].file` is a.png, as in frames[0]");
     check(HEAD, "sha256 = \"12\"\n", "S/session.toml:8: `frames[0].sha256` is no SHA-256");
     check(HEAD, "cfa = \"RGBX\"\n", "S/session.toml:8: `frames[0].cfa` is \"RGBX\"");
@@ -172,7 +182,7 @@ fn impossible_manifests_are_told_with_line_and_remedy() {
     check(
         &format!("{HEAD}[target]\nreflectance = 99\n"),
         "",
-        "S/session.toml:4: `target.reflectance` is 99",
+        "S/session.toml:4: `target.reflectance` is 99; reflectances are 0.0001 to 1.5 (1 is perfect white): is this in per cent?",
     );
     check(
         &format!("{HEAD}[target]\nboard = {{ columns = 1, rows = 6, square_mm = 25 }}\n"),

@@ -1,6 +1,7 @@
 use super::{FrameEntry, MANIFEST, Session, SessionError};
-use crate::files::{FileError, note_files, parent_of, sha256_hex, sha256_of_file, write_atomic};
-use std::fs::File;
+use crate::files::{
+    FileError, note_files, open_input, parent_of, sha256_hex, sha256_of_file, write_atomic,
+};
 use std::path::Path;
 
 /// A capture session that grows frame by frame. After every call the folder is a valid capture session: a crash loses at
@@ -71,7 +72,7 @@ impl SessionWriter {
         bytes: &[u8],
         replaced: Option<&Path>,
     ) -> Result<(), SessionError> {
-        let flush = || File::open(source).and_then(|file| file.sync_all());
+        let flush = || open_input(source).and_then(|file| file.sync_all());
         let (flushed, hash) = rayon::join(flush, || sha256_hex(bytes));
         flushed.map_err(|error| FileError::write(source, error))?;
         entry.sha256 = Some(hash);

@@ -1,4 +1,5 @@
-use crate::files::{FileError, Input, SCHEMA, write_atomic};
+use crate::files::{FileError, Input, SCHEMA, read_input_text, write_atomic};
+use crate::quantity::{DIRECTION, MM_PER_PX, Problem, SURFACE_MM, check_side};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -67,6 +68,13 @@ pub struct Report {
     /// Hash of inputs and settings together: the same key means the same solution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub key: Option<String>,
+}
+
+/// The line on which a key of the outermost object stands.
+fn line_of(json: &str, key: &str) -> usize {
+    let outermost = key.split('.').next().unwrap_or(key);
+    let quoted = format!("\"{outermost}\"");
+    1 + json.lines().position(|line| line.trim_start().starts_with(&quoted)).unwrap_or(0)
 }
 
 /// Where the inputs of a solve were, in `report.json`: whole paths, for whoever wants to look at the frames again. They may have
@@ -162,7 +170,7 @@ impl Report {
     /// # Errors
     /// Where it cannot be read, or is of another schema or broken; with file, line and remedy.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::read(path, source))?;
+        let text = read_input_text(path).map_err(|source| FileError::read(path, source))?;
         let broken = |error: serde_json::Error| FileError::Invalid {
             path: path.to_owned(),
             line: error.line().max(1),
@@ -179,7 +187,32 @@ impl Report {
                 supported: SCHEMA,
             });
         }
-        serde_json::from_str(&text).map_err(broken)
+        let report: Self = serde_json::from_str(&text).map_err(broken)?;
+        report.check().map_err(|problem| FileError::Invalid {
+            path: path.to_owned(),
+            line: line_of(&text, &problem.key),
+            what: format!("`{}` {}; run `weavelight solve` again", problem.key, problem.what),
+        })?;
+        Ok(report)
+    }
+
+    /// What readers and writers of the format ask of its numbers.
+    fn check(&self) -> Result<(), Problem> {
+        // A report from before the size was written has none.
+        if self.size_px != [0, 0] {
+            self.size_px.iter().try_for_each(|side| check_side("size_px", *side))?;
+        }
+        if !(1..=64).contains(&self.scale) {
+            let what = format!("is {}; pixels span 1 to 64 photosites", self.scale);
+            return Err(Problem::new("scale", what));
+        }
+        MM_PER_PX.maybe_at("mm_per_px", self.mm_per_px)?;
+        SURFACE_MM.all_at("plane", &self.plane.point_mm)?;
+        DIRECTION.all_at("plane", &self.plane.normal)?;
+        if self.plane.normal.iter().all(|part| part.abs() < 1e-6) {
+            return Err(Problem::new("plane", "has a normal without length"));
+        }
+        Ok(())
     }
 
     /// Writes `report.json`, whole or not at all.
@@ -188,6 +221,7 @@ impl Report {
     /// Where it cannot be written, or holds numbers that JSON cannot.
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
         let unwritable = |what: String| FileError::Unwritable { path: path.to_owned(), what };
+        self.check().map_err(|problem| FileError::unwritable(path, &problem))?;
         if !self.is_finite() {
             return Err(unwritable("a figure is not a finite number".to_owned()));
         }

@@ -1,7 +1,8 @@
 //! Lists of light directions and what stands beside them.
 
 use super::ImportError;
-use crate::files::FileError;
+use crate::files::{FileError, read_input_text};
+use crate::quantity::{DIRECTION, INTENSITY};
 use nalgebra::{UnitVector3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,9 @@ impl LightList {
 }
 
 fn direction(path: &Path, line: &Line) -> Result<UnitVector3<f64>, FileError> {
+    if let Some(what) = line.values.iter().find_map(|value| DIRECTION.check(*value).err()) {
+        return Err(invalid(path, line.number, &format!("a number of this direction {what}")));
+    }
     let vector = Vector3::from_column_slice(&line.values);
     UnitVector3::try_new(vector, 1e-9).ok_or_else(|| {
         invalid(path, line.number, "this direction has no length; write x y z to the light")
@@ -103,14 +107,14 @@ fn read_intensities(
         let what = format!("light_intensities.txt beside it has {} lines", lines.len());
         return Err(ImportError::Count { path: path.to_owned(), lights: count, what });
     }
-    let intensity = |line: &Line| match line.values[..] {
-        _ if line.values.iter().any(|value| *value <= 0.0) => Err(invalid(
-            &list,
-            line.number,
-            "an intensity is not positive; write the light's R G B",
-        )),
-        [r, g, b] => Ok([r, g, b]),
-        _ => Ok([line.values[0]; 3]),
+    let intensity = |line: &Line| {
+        if let Some(what) = line.values.iter().find_map(|value| INTENSITY.check(*value).err()) {
+            return Err(invalid(&list, line.number, &format!("an intensity {what}")));
+        }
+        match line.values[..] {
+            [r, g, b] => Ok([r, g, b]),
+            _ => Ok([line.values[0]; 3]),
+        }
     };
     let intensities = lines.iter().map(intensity).collect::<Result<_, _>>()?;
     files.push(list);
@@ -184,7 +188,7 @@ fn meaningful_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 fn read_text(path: &Path) -> Result<String, FileError> {
-    std::fs::read_to_string(path).map_err(|source| FileError::read(path, source))
+    read_input_text(path).map_err(|source| FileError::read(path, source))
 }
 
 fn shortened(line: &str) -> String {

@@ -21,7 +21,8 @@ pub(super) struct Frame {
 
 /// Reads a picture, and decodes it as a solve will: what cannot be solved is not imported.
 pub(super) fn read_frame(path: &Path, encoding: Option<Encoding>) -> Result<Frame, ImportError> {
-    let bytes = std::fs::read(path).map_err(|source| FileError::read(path, source))?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| FileError::read(path, source))?;
     let encoding = encoding.map(|encoding| match encoding {
         Encoding::Linear => raw::Encoding::Linear,
         Encoding::Srgb => raw::Encoding::Srgb,
@@ -52,7 +53,8 @@ pub(super) struct Mask {
 
 /// Reads any picture as a mask; see [`raster::decode_mask`].
 pub(super) fn read_mask(path: &Path) -> Result<Mask, FileError> {
-    let bytes = std::fs::read(path).map_err(|source| FileError::read(path, source))?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| FileError::read(path, source))?;
     let mask = raster::decode_mask(&bytes)
         .map_err(|error| FileError::Content { path: path.to_owned(), what: error.to_string() })?;
     let inside = mask.data.iter().map(|&inside| if inside { 255 } else { 0 }).collect();
