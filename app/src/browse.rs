@@ -45,7 +45,8 @@ impl Browse {
     ) {
         let (sender, answer) = mpsc::channel();
         let ctx = ctx.clone();
-        std::thread::spawn(move || {
+        // Without a thread there is no dialogue, as if it had been closed.
+        let _ = weavelight::machine::spawn("dialogue", move || {
             // Whoever asked may be gone by then.
             let _ = sender.send(pollster::block_on(dialogue));
             ctx.request_repaint();

@@ -5,6 +5,7 @@ use crate::rooms::Room;
 use crate::settings::Settings;
 use crate::worker::Command;
 use std::time::{Duration, Instant};
+use weavelight::files::one_line;
 
 /// Shared by all rooms.
 #[derive(Debug)]
@@ -45,15 +46,26 @@ pub struct Problem {
     pub severity: Severity,
 }
 
+/// Characters of a problem: names of files and what is in them may be any length.
+const LONGEST: usize = 1500;
+
 impl Problem {
     /// Work that failed.
     pub fn error(title: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { title: title.into(), text: text.into(), severity: Severity::Error }
+        Self {
+            title: title.into(),
+            text: one_line(&text.into(), LONGEST),
+            severity: Severity::Error,
+        }
     }
 
     /// Something that ought to be known.
     pub fn warning(title: impl Into<String>, text: impl Into<String>) -> Self {
-        Self { title: title.into(), text: text.into(), severity: Severity::Warning }
+        Self {
+            title: title.into(),
+            text: one_line(&text.into(), LONGEST),
+            severity: Severity::Warning,
+        }
     }
 }
 

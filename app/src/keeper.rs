@@ -24,7 +24,7 @@ impl Keeper {
     pub fn start(known: Settings) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, troubles) = mpsc::channel();
-        let thread = Some(std::thread::spawn(move || keep(&inbox, &outbox)));
+        let thread = weavelight::machine::spawn("settings", move || keep(&inbox, &outbox)).ok();
         Self { known, changes: Some(changes), troubles, thread }
     }
 

@@ -4,6 +4,7 @@ use eframe::egui;
 use weavelight_app::{App, settings::Settings, texts};
 
 fn main() -> eframe::Result {
+    weavelight::machine::start();
     weavelight::files::survive_size_limits();
     let settings = Settings::load();
     let size = settings.window_size;

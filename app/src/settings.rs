@@ -69,6 +69,11 @@ impl Default for Settings {
     }
 }
 
+/// Sizes of everything that can still be read and used.
+const SCALES: std::ops::RangeInclusive<f32> = 0.25..=4.0;
+/// Sides of a window, points.
+const SIDES: std::ops::RangeInclusive<f32> = 200.0..=20_000.0;
+
 impl Settings {
     /// Those of this user; see [`Settings::load_from`].
     pub fn load() -> Self {
@@ -78,16 +83,28 @@ impl Settings {
     /// Those in a file; they will be kept there. The defaults where there is none, or it cannot be read: a window that does not
     /// open over its settings would be worse. What cannot be read is put aside, and [`Settings::put_aside`] says where.
     pub fn load_from(file: &Path) -> Self {
-        let text = std::fs::read_to_string(file);
+        let text = weavelight::files::read_input_text(file);
         let known = text.map(|text| toml::from_str::<Self>(&text));
         let mut settings = Self::default();
         match known {
-            Ok(Ok(read)) => settings = read,
+            Ok(Ok(read)) => settings = read.sensible(),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             _ => settings.put_aside = put_aside(file),
         }
         settings.file = Some(file.to_owned());
         settings
+    }
+
+    /// Sizes that no window could have are the default ones.
+    fn sensible(mut self) -> Self {
+        let default = Self::default();
+        if !SCALES.contains(&self.scale) {
+            self.scale = default.scale;
+        }
+        if !self.window_size.iter().all(|side| SIDES.contains(side)) {
+            self.window_size = default.window_size;
+        }
+        self
     }
 
     /// Where the settings are that could not be read.
@@ -101,7 +118,16 @@ impl Settings {
     /// Where that cannot be written.
     pub fn save(&self) -> Result<(), weavelight::files::FileError> {
         let Some(file) = &self.file else { return Ok(()) };
-        let text = toml::to_string_pretty(self).unwrap_or_default();
+        let mut kept = self.clone();
+        // TOML holds text only: a folder of another name is not remembered.
+        kept.rig = kept.rig.filter(|rig| rig.to_str().is_some());
+        if kept.home.to_str().is_none() {
+            kept.home = Self::default().home;
+        }
+        let text = toml::to_string_pretty(&kept).map_err(|error| {
+            let what = error.to_string();
+            weavelight::files::FileError::Unwritable { path: file.clone(), what }
+        })?;
         if let Some(folder) = file.parent() {
             let _ = std::fs::create_dir_all(folder);
         }
@@ -151,5 +177,32 @@ mod tests {
         settings.save().unwrap();
         assert_eq!(std::fs::read_to_string(aside).unwrap(), "scale = \"huge");
         assert_eq!(Settings::load_from(&file).put_aside(), None);
+    }
+
+    #[test]
+    fn sizes_that_no_window_has_are_passed_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        for (scale, size) in
+            [("nan", "[1e30, 800.0]"), ("0.0", "[nan, inf]"), ("1e9", "[0.0, -5.0]")]
+        {
+            std::fs::write(&file, format!("scale = {scale}\nwindow_size = {size}\n")).unwrap();
+            let settings = Settings::load_from(&file);
+            assert_eq!((settings.scale, settings.window_size), (1.0, [1280.0, 800.0]));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_rig_whose_folder_is_no_text_does_not_cost_the_settings() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        let mut settings = Settings::load_from(&file);
+        settings.scale = 1.5;
+        settings.rig = Some(std::ffi::OsStr::from_bytes(b"/rig\xff").into());
+        settings.save().unwrap();
+        let read = Settings::load_from(&file);
+        assert_eq!((read.scale, read.rig), (1.5, None));
     }
 }

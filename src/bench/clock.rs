@@ -39,7 +39,7 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (Spent, T) {
 /// Processor time of all threads so far, where the system tells.
 fn processor_seconds() -> Option<f64> {
     let of_thread = |task: std::fs::DirEntry| -> Option<f64> {
-        let text = std::fs::read_to_string(task.path().join("schedstat")).ok()?;
+        let text = crate::files::read_input_text(&task.path().join("schedstat")).ok()?;
         text.split_whitespace().next()?.parse().ok()
     };
     let tasks = std::fs::read_dir("/proc/self/task").ok()?;

@@ -5,7 +5,7 @@ use super::frames::{check_size, grey_picture};
 use super::inputs::{check_out, fingerprint, load_all};
 use super::plausible::check_camera;
 use super::{CalibrateError, Inputs, Progress};
-use crate::files::{Provenance, begin_owned};
+use crate::files::{Provenance, begin_owned, check_output_folder};
 use crate::instrument::{CAMERA_FILE, MeasuredCamera, Optics, Rig, write_camera};
 use crate::session::{Board, FrameEntry, Kind, Session};
 use rayon::prelude::*;
@@ -87,6 +87,7 @@ pub fn camera(
     options: &CameraOptions,
     progress: &Progress,
 ) -> Result<CameraReport, CalibrateError> {
+    check_output_folder(&options.out)?;
     let rig = Rig::load(&options.rig)?;
     check_out(&options.out)?;
     let sessions = load_all(&options.sessions, Kind::Board)?;

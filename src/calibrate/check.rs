@@ -62,6 +62,7 @@ pub struct CheckedSheet {
     /// Per light: root mean square of what the model leaves over, relative.
     pub residual_rms: Vec<f64>,
     /// Residual map, if asked for.
+    #[serde(serialize_with = "crate::files::serialize_maybe_path")]
     pub residual_map: Option<PathBuf>,
 }
 
@@ -73,6 +74,7 @@ const MAP_RANGE: f32 = 0.01;
 /// # Errors
 /// Where calibration or frames cannot be read, a sheet cannot serve, or the maps cannot be written.
 pub fn check(options: &CheckOptions, progress: &Progress) -> Result<CheckReport, CalibrateError> {
+    options.out.as_deref().map_or(Ok(()), crate::files::check_output_folder)?;
     let calibration = Calibration::load(&options.calibration)?;
     let Some(camera) = calibration.camera.clone().filter(|_| !calibration.lights.is_empty()) else {
         let remedy = "run `weavelight calibrate camera` and `weavelight calibrate lights` first";

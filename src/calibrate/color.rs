@@ -8,7 +8,7 @@ use super::patches::{ChartFrame, ChartFrames, PatchStats, read_chart};
 use super::sheet::optics_warnings;
 use super::{CalibrateError, Inputs, Progress};
 use super::{levels as light_levels, plausible};
-use crate::files::{Provenance, begin_owned};
+use crate::files::{Provenance, begin_owned, check_output_folder};
 use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, Color, DEFECTS_FILE, Defects, Noise, Optics, Rig,
     write_color, write_defects,
@@ -82,6 +82,7 @@ pub(super) struct Chart {
 /// # Errors
 /// Where frames cannot be read, the chart is not where the capture session says, or files cannot be written.
 pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport, CalibrateError> {
+    check_output_folder(&options.out)?;
     let rig = Rig::load(&options.rig)?;
     check_out(&options.out)?;
     let _lock = begin_owned(&options.out, "calibrate color", &[COLOR_FILE, DEFECTS_FILE])?;

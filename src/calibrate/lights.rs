@@ -3,7 +3,7 @@
 use super::inputs::{check_out, load_all, no_copied_sessions};
 use super::sheet::{Known, Observed, observe, tilt_and_height};
 use super::{CalibrateError, Inputs, Progress, plausible};
-use crate::files::{Input, Provenance, begin_owned, sha256_of_file};
+use crate::files::{Input, Provenance, begin_owned, check_output_folder, sha256_of_file};
 use crate::instrument::{
     CAMERA_FILE, CalibratedLight, Calibration, LIGHTS_FILE, Noise, Rig, RigLightPlace,
     update_color, write_lights,
@@ -110,6 +110,7 @@ pub fn lights(
     options: &LightsOptions,
     progress: &Progress,
 ) -> Result<LightsReport, CalibrateError> {
+    check_output_folder(&options.out)?;
     let rig = Rig::load(&options.rig)?;
     check_out(&options.out)?;
     let _lock = begin_owned(&options.out, "calibrate lights", &[LIGHTS_FILE])?;

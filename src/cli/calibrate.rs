@@ -3,6 +3,7 @@
 use super::output::{Failure, Output, WORK_FAILED};
 use super::progress::Progress;
 use crate::calibrate::{self, CameraOptions, CheckOptions, ColorOptions, LightsOptions, StepState};
+use crate::quantity::ANGLE_DEG;
 use clap::Subcommand;
 use serde::Serialize;
 use std::fmt::Write;
@@ -95,7 +96,7 @@ enum What {
         #[arg(value_name = "WHITE_SESSION", required = true)]
         sessions: Vec<PathBuf>,
         /// Largest RMS slope error over a sheet that passes
-        #[arg(long, value_name = "DEG", default_value_t = 0.1)]
+        #[arg(long, value_name = "DEG", default_value_t = 0.1, value_parser = |text: &str| ANGLE_DEG.parse(text))]
         threshold_deg: f64,
         /// Folder for the residual maps
         #[arg(long, value_name = "DIR")]

@@ -2,8 +2,9 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
-use super::simulate::size;
+use super::simulate::{MOST_SEED, size};
 use crate::demo::{self, Options, Shot};
+use crate::files::path_text;
 use std::fmt::Write;
 use std::path::PathBuf;
 use weavelight_sim::cloth::Preset;
@@ -22,7 +23,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "WxH", default_value = "1232x816", value_parser = size)]
     size: [usize; 2],
     /// Everything random follows from it
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=MOST_SEED))]
     seed: u64,
 }
 
@@ -66,7 +67,7 @@ fn json(shots: &[Shot]) -> serde_json::Value {
     let shot = |shot: &Shot| {
         serde_json::json!({
             "fabric": shot.fabric,
-            "page": shot.page,
+            "page": path_text(&shot.page),
             "normal": shot.normal,
             "albedo": shot.albedo,
             "report": shot.report,

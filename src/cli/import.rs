@@ -2,6 +2,7 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
+use crate::files::path_text;
 use crate::session::Encoding;
 use crate::session::import::{self, ImportError, Options};
 use clap::ValueEnum;
@@ -81,8 +82,8 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
             summary.frames
         ),
         json: json!({
-            "session": summary.session,
-            "calibration": summary.calibration,
+            "session": path_text(&summary.session),
+            "calibration": path_text(&summary.calibration),
             "frames": summary.frames,
             "width_px": width,
             "height_px": height,

@@ -2,6 +2,7 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
+use crate::files::path_text;
 use crate::solve::{self, MaskOptions, Reuse};
 use serde_json::json;
 use std::path::PathBuf;
@@ -44,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     Ok(Output {
         text: format!("{}: {up_to_date}{}{named}", made.path.display(), made.swatch.said),
         json: json!({
-            "mask": made.path,
+            "mask": path_text(&made.path),
             "table_share": made.swatch.table_share,
             "said": made.swatch.said,
             "up_to_date": made.up_to_date,

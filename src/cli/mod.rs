@@ -19,6 +19,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+use crate::machine;
 use clap::{Parser, Subcommand};
 use output::{Failure, Output};
 use std::process::ExitCode;
@@ -69,6 +70,18 @@ impl Command {
 
 /// Runs the command that the process was called with, prints what it says, and returns the exit status.
 pub fn main() -> ExitCode {
+    // The first thread's stack is as small as `ulimit -s` makes it.
+    match machine::spawn("command", call) {
+        Ok(thread) => thread.join().unwrap_or(ExitCode::from(PANICKED)),
+        Err(_) => call(),
+    }
+}
+
+/// As the standard library's own status of a program that panicked.
+const PANICKED: u8 = 101;
+
+fn call() -> ExitCode {
+    machine::start();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => return output::refuse(&error),

@@ -1,8 +1,12 @@
 //! What a command says, and where.
 
+use crate::files::{harmless, harmless_json, one_line};
 use std::fmt::Display;
 use std::io::Write;
 use std::process::ExitCode;
+
+/// Characters of one message: names of files and what is in them may be any length.
+const LONGEST: usize = 1500;
 
 /// Exit status of work that failed.
 pub(super) const WORK_FAILED: u8 = 1;
@@ -46,14 +50,17 @@ pub(super) fn finish(result: Result<Output, Failure>, json: bool) -> ExitCode {
     match result {
         Ok(output) => {
             for warning in &output.warnings {
-                to_stderr(&format!("warning: {warning}"));
+                to_stderr(&format!("warning: {}", one_line(warning, LONGEST)));
             }
-            let text = if json { output.json.to_string() } else { output.text };
-            to_stdout(&text);
+            if json {
+                to_stdout(&harmless_json(&output.json.to_string()));
+            } else {
+                to_stdout(&harmless(&output.text));
+            }
             ExitCode::from(output.status)
         }
         Err(failure) => {
-            to_stderr(&format!("error: {}", failure.message));
+            to_stderr(&format!("error: {}", one_line(&failure.message, LONGEST)));
             ExitCode::from(failure.status)
         }
     }
@@ -71,8 +78,9 @@ pub(super) fn refuse(error: &clap::Error) -> ExitCode {
             to_stderr(&error.render().to_string());
             ExitCode::from(CALL_WRONG)
         }
+        // The values that were given are in it.
         _ => {
-            to_stderr(&in_two_lines(&error.render().to_string()));
+            to_stderr(&in_two_lines(&harmless(&error.render().to_string())));
             ExitCode::from(CALL_WRONG)
         }
     }
@@ -86,7 +94,7 @@ fn in_two_lines(message: &str) -> String {
         .lines()
         .find(|line| line.starts_with("Usage:"))
         .unwrap_or("Try `weavelight --help`");
-    format!("{}\n{usage}; see --help", paragraph.join(" "))
+    format!("{}\n{usage}; see --help", one_line(&paragraph.join(" "), LONGEST))
 }
 
 /// A reader that stopped listening (`weavelight ... | head`) is no failure of the work, so errors are let go.

@@ -1,10 +1,14 @@
 //! A bar on standard error, and only on a terminal.
 
+use crate::files::one_line;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::Write;
 
 /// Steps of the bar: fine enough that it does not jump.
 const STEPS: u64 = 1000;
+
+/// Characters beside the bar.
+const LONGEST: usize = 300;
 
 /// How far a command is.
 pub(super) struct Progress(ProgressBar);
@@ -22,8 +26,9 @@ impl Progress {
     /// `share` of the work is done, 0 to 1; `what` is going on.
     pub(super) fn set(&self, share: f64, what: &str) {
         self.0.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        let what = one_line(what, LONGEST);
         if self.0.message() != what {
-            self.0.set_message(what.to_owned());
+            self.0.set_message(what);
         }
     }
 }
@@ -31,7 +36,7 @@ impl Progress {
 impl Progress {
     /// A line that stays, over the bar; on a terminal only.
     pub(super) fn say(&self, line: &str) {
-        self.0.println(line);
+        self.0.println(one_line(line, LONGEST));
     }
 
     /// A line that stays, on a terminal or not: what the user has to do for the work to go on.

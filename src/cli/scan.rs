@@ -8,7 +8,9 @@ use crate::device::scan::{
     About, Begin, Control, Event, Instruments, Options, Plan, Preview, ScanError, Step, Subject,
     Summary, open, preview, scan, survey,
 };
+use crate::files::path_text;
 use crate::instrument::Rig;
+use crate::quantity::THICKNESS_MM;
 use crate::session::{FrameEntry, Session};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -66,10 +68,7 @@ pub(super) struct Args {
 }
 
 fn thickness(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
-        _ => Err("write millimetres from 0 to 100".to_owned()),
-    }
+    THICKNESS_MM.parse(text)
 }
 
 /// Exposure of a test shot where none is given, seconds.
@@ -175,7 +174,7 @@ fn of_summary(summary: &Summary) -> Value {
     let retries: Vec<Value> =
         summary.retries.iter().map(|(frame, why)| json!({ "frame": frame, "why": why })).collect();
     json!({
-        "session": summary.folder,
+        "session": path_text(&summary.folder),
         "frames": summary.frames,
         "resumed": summary.resumed,
         "exposure_s": summary.settings.map(|s| s.exposure_s),

@@ -2,6 +2,7 @@
 
 use super::output::{Failure, Output};
 use super::progress::Progress;
+use crate::files::path_text;
 use crate::simulate::{self, Flaws, Material, Options, Part, Summary, Targets};
 use clap::builder::PossibleValuesParser;
 use std::path::PathBuf;
@@ -26,7 +27,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<[usize; 2]>,
     /// Everything random follows from it
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=MOST_SEED))]
     seed: u64,
     /// Photograph only these, comma-separated [default: all]
     #[arg(long, value_name = "PART,...", value_delimiter = ',', value_parser = names(&Part::ALL.map(Part::name)))]
@@ -150,6 +151,9 @@ struct FlawArgs {
     noiseless: bool,
 }
 
+/// The largest integer that TOML holds.
+pub(super) const MOST_SEED: u64 = i64::MAX as u64;
+
 fn names(all: &[&'static str]) -> PossibleValuesParser {
     PossibleValuesParser::new(all)
 }
@@ -258,7 +262,7 @@ fn text(summary: &Summary) -> String {
 
 fn json(summary: &Summary) -> serde_json::Value {
     serde_json::json!({
-        "out": summary.out,
+        "out": path_text(&summary.out),
         "sessions": summary.sessions,
         "frames": summary.frames,
         "size_px": summary.size_px,

@@ -2,6 +2,7 @@
 
 use super::output::Failure;
 use crate::device::scan::{Pose, Sheet, Subject};
+use crate::quantity::{REFLECTANCE, SQUARE_MM, SURFACE_MM, check_corners};
 use crate::session::{Board, Target};
 use clap::ValueEnum;
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -20,7 +21,7 @@ pub(super) struct TargetArgs {
     #[arg(long, value_name = "CxRxMM", value_parser = board)]
     board: Option<Board>,
     /// Reflectance of the white sheet [default: 0.99]
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", value_parser = |text: &str| REFLECTANCE.parse(text))]
     reflectance: Option<f64>,
     /// A point on the white sheet where that is tilted, rig frame
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
@@ -52,13 +53,11 @@ enum PoseName {
 }
 
 fn vector(text: &str) -> Result<Vector3<f64>, String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok().filter(|number: &f64| number.is_finite()))
-        .collect();
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|part| SURFACE_MM.parse(part).ok()).collect();
     match numbers.as_deref() {
         Some(&[x, y, z]) => Ok(Vector3::new(x, y, z)),
-        _ => Err("write three numbers, as in 0,0,60".to_owned()),
+        _ => Err("write three numbers from -5000 to 5000, as in 0,0,60".to_owned()),
     }
 }
 
@@ -69,9 +68,9 @@ fn board(text: &str) -> Result<Board, String> {
         let rows = parts.next()?.parse().ok()?;
         let square_mm: f64 = parts.next()?.parse().ok()?;
         let sensible = parts.next().is_none()
-            && (2..=1000).contains(&columns)
-            && (2..=1000).contains(&rows)
-            && (0.1..=1e4).contains(&square_mm);
+            && check_corners("columns", columns).is_ok()
+            && check_corners("rows", rows).is_ok()
+            && SQUARE_MM.check(square_mm).is_ok();
         sensible.then_some(Board { columns, rows, square_mm })
     };
     board().ok_or_else(|| {

@@ -29,7 +29,7 @@ impl Source {
     /// # Errors
     /// Where it cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, CompareError> {
-        let bytes = std::fs::read(path)
+        let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
             .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
         let content = match Format::sniff(&bytes) {
             Some(Format::Exr) => decode_exr(&bytes).map(Content::Exr),

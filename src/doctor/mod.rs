@@ -1,6 +1,7 @@
 //! What of the machine and the instrument is there and usable, without touching any of it.
 
 use crate::device::board::{BoardError, Identity, PortChoice, PortFinding, diagnose};
+use crate::files::read_input_text;
 use crate::gpu::{Adapter, Gpu};
 use serde::Serialize;
 use std::fs;
@@ -20,6 +21,7 @@ pub struct Examination {
     /// Memory that can be had without swapping; `None` where the system does not say.
     pub available_memory_mb: Option<u64>,
     /// The folder asked about.
+    #[serde(serialize_with = "crate::files::serialize_path")]
     pub folder: PathBuf,
     /// Why it cannot be written; `None` where it can.
     pub write_error: Option<String>,
@@ -42,6 +44,7 @@ pub struct Graphics {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SerialPort {
     /// As in `/dev/ttyACM0`.
+    #[serde(serialize_with = "crate::files::serialize_path")]
     pub path: PathBuf,
     /// Whether this user may open it.
     pub usable: bool,
@@ -51,6 +54,7 @@ pub struct SerialPort {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LightBoard {
     /// Where.
+    #[serde(serialize_with = "crate::files::serialize_path")]
     pub port: PathBuf,
     /// Version of its firmware, if one answers.
     pub firmware: Option<String>,
@@ -91,7 +95,7 @@ pub fn examine(folder: &Path) -> Examination {
         opencv: cfg!(feature = "opencv"),
         graphics: graphics(),
         cores: std::thread::available_parallelism().map_or(1, usize::from),
-        available_memory_mb: fs::read_to_string("/proc/meminfo")
+        available_memory_mb: read_input_text(Path::new("/proc/meminfo"))
             .ok()
             .as_deref()
             .and_then(available_memory_mb),

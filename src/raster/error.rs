@@ -61,6 +61,9 @@ pub enum PictureError {
         /// Length of the file.
         bytes: u64,
     },
+    /// More memory than there is.
+    #[error(transparent)]
+    NoMemory(#[from] crate::machine::NoMemory),
 }
 
 impl PictureError {
@@ -86,7 +89,7 @@ impl PictureError {
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// Missing, or not readable.
-    #[error("{}: {source}; check the name and the permissions", path.display())]
+    #[error("{}: {}", path.display(), crate::files::read_advice(source))]
     Read {
         /// The file.
         path: PathBuf,

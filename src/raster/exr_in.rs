@@ -102,8 +102,8 @@ impl Exr {
 /// # Errors
 /// [`FileError`] with the path.
 pub fn read_exr(path: &Path) -> Result<Exr, FileError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     decode_exr(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
 }
 

@@ -3,7 +3,7 @@
 use super::PictureError;
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::sync::Once;
+use std::sync::{Mutex, Once, PoisonError};
 
 thread_local! {
     /// True on a thread while a guarded decoder runs: its panics become errors and are not printed.
@@ -18,7 +18,7 @@ pub(crate) fn guarded<T, E: From<PictureError>>(
     let before = QUIET.replace(true);
     let outcome = catch_unwind(AssertUnwindSafe(decoder));
     QUIET.set(before);
-    outcome.unwrap_or_else(|_| Err(PictureError::damaged("its decoder gave up").into()))
+    outcome.unwrap_or_else(|_| Err(PictureError::damaged(GAVE_UP).into()))
 }
 
 /// Like [`guarded`] for a decoder that uses rayon itself: it gets a pool of one thread of its own, so that its panics are
@@ -32,19 +32,27 @@ pub(crate) fn guarded_pool<T: Send, E: From<PictureError> + Send>(
         .num_threads(1)
         .stack_size(8 << 20)
         .start_handler(|_| QUIET.set(true))
-        .build()
-        .map_err(|error| {
-            PictureError::unsupported(
-                format!("the file ({error})"),
-                "close other programs and try again",
-            )
-        })?;
-    std::thread::scope(|scope| {
-        let waiting = scope.spawn(|| pool.install(|| catch_unwind(AssertUnwindSafe(decoder))));
-        waiting.join().ok().and_then(Result::ok)
-    })
-    .unwrap_or_else(|| Err(PictureError::damaged("its decoder gave up").into()))
+        .build();
+    // Where no thread is to be had, the decoder shares ours.
+    let Ok(pool) = pool else { return guarded(decoder) };
+    // Who starts the waiting thread in vain has the decoder back.
+    let decoder = Mutex::new(Some(decoder));
+    let take = || decoder.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let waited = std::thread::scope(|scope| {
+        let work = || take().map(|d| pool.install(|| catch_unwind(AssertUnwindSafe(d))));
+        let waiting = std::thread::Builder::new().spawn_scoped(scope, work).ok()?;
+        waiting.join().ok().flatten()
+    });
+    match (waited, take()) {
+        (Some(outcome), _) => {
+            outcome.unwrap_or_else(|_| Err(PictureError::damaged(GAVE_UP).into()))
+        }
+        (None, Some(decoder)) => guarded(decoder),
+        (None, None) => Err(PictureError::damaged(GAVE_UP).into()),
+    }
 }
+
+const GAVE_UP: &str = "its decoder gave up";
 
 /// The process's one panic hook, wrapped once: silent on threads that are [`QUIET`], unchanged on all others.
 fn install_hook() {

@@ -1,6 +1,7 @@
 //! How large a picture a file may claim to hold. Decoders allocate by what the file claims, so this comes first.
 
 use super::PictureError;
+use crate::machine::check_memory;
 
 /// More samples than any camera of the next years; 800 MB of u16.
 const MOST_SAMPLES: u64 = 400_000_000;
@@ -8,6 +9,11 @@ const MOST_SAMPLES: u64 = 400_000_000;
 /// Samples that one byte of a file can stand for. Deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes from two
 /// bits), LZW about 1400; a flat JPEG block of 64 samples takes six bits or more.
 const MOST_SAMPLES_PER_BYTE: u64 = 1_500;
+
+/// Pictures up to here need less memory than a limit that the program starts under leaves.
+const SMALL_SAMPLES: u64 = 4_000_000;
+/// The decoded numbers, and the same again while they are put into rows of another type.
+const BYTES_PER_SAMPLE: u64 = 4;
 
 /// Bytes that one byte of a deflated file can stand for.
 const MOST_BYTES_PER_BYTE: u64 = 1_040;
@@ -30,7 +36,7 @@ pub(crate) fn check_packed(
 }
 
 /// # Errors
-/// No pixels at all, or more than the file's length can hold.
+/// No pixels at all, more than the file's length can hold, or more than there is memory for.
 pub(crate) fn check(
     width: u64,
     height: u64,
@@ -45,5 +51,10 @@ pub(crate) fn check(
     if samples > MOST_SAMPLES || samples > bytes.saturating_mul(MOST_SAMPLES_PER_BYTE) {
         return Err(PictureError::TooLarge { width, height, bytes });
     }
-    Ok(())
+    if samples < SMALL_SAMPLES {
+        return Ok(());
+    }
+    let what = || format!("decoding {width} x {height} pixels");
+    let remedy = "close other programs or raise the limit";
+    Ok(check_memory(what, samples.saturating_mul(BYTES_PER_SAMPLE), remedy)?)
 }

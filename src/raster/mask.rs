@@ -13,8 +13,8 @@ const JPEG_INSIDE: u8 = 128;
 /// # Errors
 /// [`FileError`] with the path. Whether the size fits is the caller's to judge.
 pub fn read_mask(path: &Path) -> Result<Image<bool>, FileError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     decode_mask(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
 }
 

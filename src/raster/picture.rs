@@ -153,8 +153,8 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Picture, PictureError> {
 /// # Errors
 /// [`FileError`] with the path.
 pub fn read_picture(path: &Path) -> Result<Picture, FileError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     decode_picture(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
 }
 

@@ -56,7 +56,7 @@ pub(crate) const CONVERT_TO_DNG: &str = "convert it to an uncompressed DNG";
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file is missing or cannot be read.
-    #[error("{}: {source}; check the name in session.toml and the permissions", path.display())]
+    #[error("{}: {}", path.display(), crate::files::read_advice(source))]
     Io {
         /// The file.
         path: PathBuf,

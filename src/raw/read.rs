@@ -1,6 +1,7 @@
 //! Frames from files: hashes checked, several at once.
 
 use super::{Frame, Hint, ReadError, decode};
+use crate::files::{InputKind, read_input};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ pub fn read(path: &Path, hint: &Hint) -> Result<Frame, ReadError> {
 /// [`ReadError`] with the path.
 pub fn read_source(source: &Source) -> Result<Frame, ReadError> {
     let path = || source.path.clone();
-    let bytes = std::fs::read(&source.path)
+    let bytes = read_input(&source.path, InputKind::Picture)
         .map_err(|error| ReadError::Io { path: path(), source: error })?;
     if let Some(expected) = &source.sha256 {
         let found = hex(&Sha256::digest(&bytes));

@@ -11,6 +11,9 @@ pub enum SimulateError {
     /// A capture session.
     #[error(transparent)]
     Session(#[from] SessionError),
+    /// More memory than there is.
+    #[error(transparent)]
+    Memory(#[from] crate::machine::NoMemory),
     /// An option that makes no sense.
     #[error("{option} is {value}; {remedy}")]
     Option {

@@ -4,6 +4,7 @@ use crate::instrument::{
     CalibratedLight, CameraKind, Color, Controller, MeasuredCamera, Noise, Optics, Rig, RigCamera,
     RigLight, RigLightPlace, write_camera, write_color, write_lights,
 };
+use crate::quantity::{self, PIXEL_PITCH_UM, Problem};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::{Cfa, DirectionalLight, Image, Light};
@@ -56,6 +57,7 @@ impl Instrument {
     pub(super) fn of_rig(rig: Rig, options: &Options) -> Result<Self, SimulateError> {
         check_size(options, &rig.camera)?;
         let nominal = nominal_camera(&rig.camera);
+        check_view(options, &nominal)?;
         let stage = Stage {
             view: View {
                 camera: nominal.true_camera(options.seed),
@@ -241,6 +243,19 @@ fn check_size(options: &Options, camera: &RigCamera) -> Result<(), SimulateError
                 .to_owned(),
         }),
     }
+}
+
+/// The figures of camera and table must fit each other: those that the rig does not give are the reference camera's.
+fn check_view(options: &Options, camera: &NominalCamera) -> Result<(), SimulateError> {
+    let NominalCamera { size_px: [width_px, _], focal_length_mm, pitch_um, height_mm } = *camera;
+    let key = "camera.pixel_pitch_um";
+    PIXEL_PITCH_UM
+        .at(key, pitch_um)
+        .and_then(|()| quantity::check_view(key, width_px, pitch_um, focal_length_mm, height_mm))
+        .map_err(|Problem { key, what }| SimulateError::Rig {
+            path: options.rig.clone().unwrap_or_else(|| PathBuf::from("rig.toml")),
+            what: format!("`{key}` {what}"),
+        })
 }
 
 /// What the rig says of its camera; where it says nothing, the reference camera's field of view.

@@ -22,6 +22,7 @@ pub use scene::{SCENE_FILE, Scene};
 pub use table::{Laid, Lying, lay};
 
 use crate::files::{FileError, OutputKind, StagedFolder, check_owned};
+use crate::machine::check_memory;
 use parts::Studio;
 use std::path::PathBuf;
 
@@ -54,6 +55,7 @@ pub fn run(
 ) -> Result<Summary, SimulateError> {
     options.check()?;
     let instrument = Instrument::from_options(options)?;
+    check_room(options, &instrument)?;
     let staged = StagedFolder::create(&options.out, OUTPUT)?;
     instrument.write(options, staged.path())?;
     let studio = Studio { options, instrument: &instrument, folder: staged.path() };
@@ -78,6 +80,19 @@ pub fn run(
     staged.commit()?;
     progress(1.0, "done");
     Ok(summary)
+}
+
+/// Bytes a photosite of the truth, and of a frame that is being encoded.
+const TRUTH_BYTES_PER_PX: u64 = 40;
+
+/// The frames of one capture session are held until all are exposed.
+fn check_room(options: &Options, instrument: &Instrument) -> Result<(), SimulateError> {
+    let [width, height] = instrument.size_px();
+    // A grey chart has one light at several exposures beside all at one.
+    let frames = (instrument.stage.lights.len() + 12).max(options.targets.boards) as u64;
+    let bytes = (width * height) as u64 * (2 * frames + TRUTH_BYTES_PER_PX);
+    let what = || format!("simulating {frames} frames of {width} x {height}");
+    Ok(check_memory(what, bytes, "give a smaller --size, or close other programs")?)
 }
 
 /// Writes only what a technician has before the first picture, `rig.toml`, and the `scene.toml` that the simulated camera

@@ -5,6 +5,7 @@ use super::table::{TableTable, lying_from_table, table_from_lying};
 use super::{Flaws, Instrument, Lying, Material, Options, SimulateError};
 use crate::files::{Document, FileError, SCHEMA, write_toml};
 use crate::instrument::{Rig, RigLightPlace};
+use crate::quantity::{DIRECTION, check_light_place};
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -185,6 +186,13 @@ fn scene_from_document(document: &Document, rig: &Path) -> Result<Scene, FileErr
 }
 
 fn place(document: &Document, k: usize, table: &PlaceTable) -> Result<RigLightPlace, FileError> {
+    let key = |name: &str| format!("lights.{k}.{name}");
+    let position =
+        table.position_mm.map_or(Ok(()), |at| check_light_place(&key("position_mm"), at));
+    let entries = table.direction.as_ref().map_or(&[][..], |direction| direction);
+    position
+        .and_then(|()| DIRECTION.all_at(&key("direction"), entries))
+        .map_err(|problem| document.problem(&problem))?;
     let direction = |d: [f64; 3]| UnitVector3::try_new(Vector3::from(d), 1e-9);
     match (table.position_mm, table.direction.and_then(direction)) {
         (Some(position), None) => Ok(RigLightPlace::Point {

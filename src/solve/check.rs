@@ -106,11 +106,10 @@ pub(crate) fn check_light_field(
         return too_few(scene).map(|()| vec![]);
     }
     let places = nine_places(scene.size_px());
-    let conditions: Vec<f64> = places
-        .iter()
-        .filter_map(|&pixel| field.exact(pixel))
-        .map(|vectors| condition(&vectors))
-        .collect();
+    let vectors: Vec<Vec<Vector3<f64>>> =
+        places.iter().filter_map(|&pixel| field.exact(pixel)).collect();
+    let mut warnings = behind_the_surface(scene, &vectors);
+    let conditions: Vec<f64> = vectors.iter().map(|vectors| condition(vectors)).collect();
     let best = conditions.iter().copied().fold(f64::INFINITY, f64::min);
     let worst = conditions.iter().copied().fold(0.0, f64::max);
     if best >= DEPENDENT_CONDITION {
@@ -120,14 +119,33 @@ pub(crate) fn check_light_field(
             what: name_dependence(scene, &middle),
         });
     }
-    if worst <= POOR_CONDITION {
-        return Ok(vec![]);
+    if worst > POOR_CONDITION {
+        warnings.push(poor(worst));
     }
-    Ok(vec![format!(
+    Ok(warnings)
+}
+
+fn poor(worst: f64) -> String {
+    format!(
         "The light vectors nearly lie in one plane (condition number {worst:.0}): expect normals with about {:.0} times the \
          noise across that plane; spread the lights out.",
         worst / 2.0
-    )])
+    )
+}
+
+/// Lights that shine on the back of the surface, wherever in the frame: a sheet is tilted away from them, or their place is
+/// wrong.
+fn behind_the_surface(scene: &Scene, places: &[Vec<Vector3<f64>>]) -> Vec<String> {
+    let behind = |k: usize| places.iter().all(|vectors| scene.plane.normal.dot(&vectors[k]) <= 0.0);
+    let lights = (0..scene.lights.len()).filter(|k| !places.is_empty() && behind(*k));
+    let warn = |k: usize| {
+        format!(
+            "Light {} is behind the surface everywhere in the frame: correct its place in lights.toml, or [plane] in \
+             session.toml.",
+            scene.lights[k].index
+        )
+    };
+    lights.map(warn).collect()
 }
 
 fn nine_places((width, height): (usize, usize)) -> Vec<[f64; 2]> {

@@ -44,7 +44,7 @@ impl Memory {
     /// What the file remembers; nothing where there is none, or it is of another machine, program or format.
     pub(super) fn read(path: &Path) -> Self {
         let now = Self::default();
-        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let text = crate::files::read_input_text(path).unwrap_or_default();
         let before = serde_json::from_str::<Self>(&text).ok();
         let same = |before: &Self| {
             (before.schema, &before.program, &before.drivers)

@@ -1,5 +1,6 @@
 use crate::files::FileError;
 use crate::gpu::GpuError;
+use crate::machine::NoMemory;
 use crate::raw::ReadError;
 use crate::session::SessionError;
 use std::path::PathBuf;
@@ -139,12 +140,7 @@ pub enum SolveError {
         /// Pixel, v.
         v: f64,
     },
-    /// Threads that cannot be started.
-    #[error("cannot start {threads} threads ({source}); ask for fewer with --threads")]
-    Threads {
-        /// How many.
-        threads: usize,
-        /// Why.
-        source: rayon::ThreadPoolBuildError,
-    },
+    /// More memory than there is.
+    #[error(transparent)]
+    Memory(#[from] NoMemory),
 }

@@ -55,6 +55,33 @@ pub(crate) fn finish(maps: Maps, color: &Color, outputs: Outputs) -> Finished {
     Finished { normal, albedo, confidence: expected_error_deg, mask }
 }
 
+/// Makes photosites unsolved whose normal, albedo or error left the range of float32: files hold no NaN and no infinity.
+/// A sentence if there were any.
+pub(super) fn leave_out_what_is_not_finite(maps: &mut Finished) -> Option<String> {
+    // Without an albedo its rows are empty.
+    let mut no_albedo: Vec<[f32; 3]> =
+        vec![[0.0; 3]; if maps.albedo.data.is_empty() { maps.mask.data.len() } else { 0 }];
+    let albedo = if no_albedo.is_empty() { &mut maps.albedo.data } else { &mut no_albedo };
+    let pixels = maps.normal.data.par_iter_mut().zip(albedo);
+    let pixels = pixels.zip(&mut maps.confidence.data).zip(&mut maps.mask.data);
+    let left_out: usize = pixels
+        .map(|(((normal, albedo), confidence), mask)| {
+            let finite = normal.iter().chain(albedo.iter()).all(|value| value.is_finite());
+            if finite && confidence.is_finite() {
+                return 0;
+            }
+            (*normal, *albedo, *confidence) = ([0.0; 3], [0.0; 3], 0.0);
+            usize::from(std::mem::replace(mask, 0) != 0)
+        })
+        .sum();
+    (left_out > 0).then(|| {
+        format!(
+            "{left_out} photosites gave numbers that a map cannot hold and were left out; check exposures, \
+             intensities and the colour matrix."
+        )
+    })
+}
+
 pub(super) fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
     let matrix = matrix.cast::<f32>();
     albedo

@@ -7,8 +7,9 @@ use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
 use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
+use crate::machine::check_memory;
 use crate::raster::decode_mask;
-use crate::raw::{Frame, Histogram, ReadError, contradictions};
+use crate::raw::{Frame, Histogram, ReadError, Samples, contradictions};
 use crate::session::{FrameEntry, Kind, Session, SessionError};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -200,11 +201,31 @@ fn read_frames(
     for group in session.frames.chunks(at_once) {
         let decoded: Vec<Result<Frame, SessionError>> =
             group.par_iter().with_max_len(1).map(read).collect();
+        let first = frames.is_empty();
         for frame in decoded {
             frames.push(frame?);
         }
+        if let (true, Some(frame)) = (first, frames.first()) {
+            check_room(frame, total)?;
+        }
     }
     Ok(frames)
+}
+
+/// Bytes a photosite of the maps, and of what they are made of and encoded from.
+const MAP_BYTES_PER_PX: u64 = 60;
+
+/// What a solve will need is known from the first frame.
+fn check_room(frame: &Frame, total: usize) -> Result<(), SolveError> {
+    let samples = match &frame.samples {
+        Samples::U16(values) => 2 * values.len() as u64,
+        Samples::F32(values) => 4 * values.len() as u64,
+    };
+    let pixels = (frame.width * frame.height) as u64;
+    let at_least = samples * (total as u64).saturating_sub(FILES_AT_ONCE as u64);
+    let what = || format!("solving {total} frames of {} x {}", frame.width, frame.height);
+    let remedy = "close other programs, raise the limit, or make a preview with --preview 4";
+    Ok(check_memory(what, at_least + MAP_BYTES_PER_PX * pixels, remedy)?)
 }
 
 fn exposure(session: &Session, entry: &FrameEntry, frame: Frame) -> Exposure {
@@ -267,8 +288,8 @@ fn arrange(
 
 /// A picture of the frames' size; see [`decode_mask`].
 pub(super) fn read_mask(path: &Path, scene: &Scene) -> Result<Image<bool>, SolveError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| crate::files::FileError::read(path, source))?;
+    let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
+        .map_err(|source| crate::files::FileError::read(path, source))?;
     let mask = decode_mask(&bytes)
         .map_err(|source| ReadError::Decode { path: path.to_owned(), source: source.into() })?;
     if (mask.width, mask.height) != scene.size_px() {

@@ -3,7 +3,9 @@
 use super::SolveError;
 use super::current::{key, still_current};
 use super::encode::write_maps;
-use super::finish::{Finished, color_space, finish, pinhole, undistort};
+use super::finish::{
+    Finished, color_space, finish, leave_out_what_is_not_finite, pinhole, undistort,
+};
 use super::in_memory::{
     SolvedScene, leave_out_what_adds_nothing, solve_scene_on, solve_scene_with_residuals,
 };
@@ -19,6 +21,7 @@ use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_a
 use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE, MeasuredCamera, write_camera,
 };
+use crate::machine::Pool;
 use crate::photometry::{Method, Outcome};
 use crate::raw::preview;
 use crate::session::Session;
@@ -74,12 +77,7 @@ pub fn run_with_page(
     progress: &(dyn Fn(Progress) + Sync),
     page: Option<Page>,
 ) -> Result<Solved, SolveError> {
-    let threads = options.threads.unwrap_or(0);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|source| SolveError::Threads { threads, source })?;
-    pool.install(|| run_on_this_pool(options, progress, page))
+    Pool::new(options.threads).install(|| run_on_this_pool(options, progress, page))
 }
 
 fn run_on_this_pool(
@@ -147,7 +145,9 @@ fn make(
     let counts = maps.counts;
     let shown = page.is_some();
     let wanted = Outputs { albedo: options.outputs.albedo || shown, ..options.outputs };
-    let finished = on_grid(finish(maps, &rest.color, wanted), rest.camera.as_ref(), options.grid);
+    let mut maps = finish(maps, &rest.color, wanted);
+    warnings.extend(leave_out_what_is_not_finite(&mut maps));
+    let finished = on_grid(maps, rest.camera.as_ref(), options.grid);
     watch.lap(Stage::Colour);
     write_maps(staged.path(), &finished, options, progress)?;
     copy_camera(&rest, options, staged.path())?;
@@ -256,7 +256,7 @@ fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), Solv
     let target = folder.join(CAMERA_FILE);
     match options.grid {
         Grid::Sensor if options.scale == Scale::Full => {
-            let copied = std::fs::copy(&rest.calibrated_camera, &target);
+            let copied = crate::files::copy_input(&rest.calibrated_camera, &target);
             copied.map_err(|source| crate::files::FileError::write(&target, source))?;
         }
         Grid::Sensor => {

@@ -127,10 +127,10 @@ impl Fabric {
     }
 
     /// Distance of the nodes of the height grid: finer than both photosites and yarns, but no finer than a frame of few
-    /// pixels can show.
+    /// pixels can show, nor than a yarn's form needs: shadows are as long under a microscope, and the grid must hold them.
     fn grid_step_mm(&self, mm_per_px: f64) -> f64 {
         let fine = (0.5 * mm_per_px).min(self.cloth.relief.detail_mm() / 6.0);
-        fine.max(mm_per_px / 12.0)
+        fine.max(mm_per_px / 12.0).max(self.cloth.relief.detail_mm() / 25.0)
     }
 }
 

@@ -26,9 +26,22 @@ pub fn diagnose(choice: &PortChoice, lights: Option<usize>) -> Vec<PortFinding> 
         PortChoice::Simulated(_) => Vec::new(),
     };
     std::thread::scope(|scope| {
-        let threads: Vec<_> =
-            ports.into_iter().map(|port| scope.spawn(move || look_at(port, lights))).collect();
-        threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+        let threads: Vec<_> = ports
+            .into_iter()
+            .map(|port| {
+                let beside = port.clone();
+                let look = move || look_at(beside, lights);
+                (port, std::thread::Builder::new().spawn_scoped(scope, look))
+            })
+            .collect();
+        threads
+            .into_iter()
+            .filter_map(|(port, thread)| match thread {
+                Ok(thread) => thread.join().ok(),
+                // Where no thread is to be had, one port is looked at after the other.
+                Err(_) => Some(look_at(port, lights)),
+            })
+            .collect()
     })
 }
 

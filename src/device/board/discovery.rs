@@ -85,9 +85,21 @@ pub(super) fn find_again(
 /// Asks at all ports at once: a port behind which nobody answers takes five seconds.
 fn find_among(ports: &[PathBuf], origin: Instant) -> Result<Connection, BoardError> {
     let tried: Vec<Result<Connection, BoardError>> = std::thread::scope(|scope| {
-        let threads: Vec<_> =
-            ports.iter().map(|port| scope.spawn(move || connect_at(port, origin))).collect();
-        threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
+        let threads: Vec<_> = ports
+            .iter()
+            .map(|port| {
+                let ask = move || connect_at(port, origin);
+                (port, std::thread::Builder::new().spawn_scoped(scope, ask))
+            })
+            .collect();
+        threads
+            .into_iter()
+            .filter_map(|(port, thread)| match thread {
+                Ok(thread) => thread.join().ok(),
+                // Where no thread is to be had, one port is asked after the other.
+                Err(_) => Some(connect_at(port, origin)),
+            })
+            .collect()
     });
     let mut errors = Vec::new();
     for result in tried {

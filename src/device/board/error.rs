@@ -16,6 +16,14 @@ pub enum BoardError {
         /// What each port had to say: whole sentences.
         tried: Vec<String>,
     },
+    /// The system gives no thread to talk to the board.
+    #[error(
+        "no thread can be started for the light board ({reason}); close other programs or raise the limit (ulimit -u)"
+    )]
+    NoThread {
+        /// As the system says.
+        reason: String,
+    },
     /// The port is not there.
     #[error("{}: there is no such port; connect the light board, or correct [controller] port in rig.toml", .port.display())]
     PortMissing {

@@ -7,6 +7,7 @@ use super::error::BoardError;
 use super::machine::{Event, Interruption, LightBoard};
 use super::stream::Stream;
 use super::wire::{Answer, Identity, Outputs, Request, Setting};
+use crate::machine;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -80,13 +81,17 @@ impl Board {
         let origin = Instant::now();
         let connection = find(&choice, origin)?;
         check_lights(&connection, lights)?;
-        let board = Self::start(choice, connection, origin);
+        let board = Self::start(choice, connection, origin)?;
         board.off()?;
         board.take_interruptions();
         Ok(board)
     }
 
-    fn start(choice: PortChoice, connection: Connection, origin: Instant) -> Self {
+    fn start(
+        choice: PortChoice,
+        connection: Connection,
+        origin: Instant,
+    ) -> Result<Self, BoardError> {
         let (messages, inbox) = mpsc::channel();
         let state =
             State { port: connection.port.clone(), connected: true, interruptions: Vec::new() };
@@ -106,8 +111,9 @@ impl Board {
             expected: identity.clone(),
             asked: VecDeque::new(),
         };
-        let worker = std::thread::spawn(move || worker.run(connection, &inbox));
-        Self { messages, shared, worker: Some(worker), identity }
+        let worker = machine::spawn("light board", move || worker.run(connection, &inbox))
+            .map_err(|error| BoardError::NoThread { reason: error.to_string() })?;
+        Ok(Self { messages, shared, worker: Some(worker), identity })
     }
 
     /// Switches `light` (an output of the board, from 0) on and every other off; returns when it has settled. `level`: 1 to
@@ -379,7 +385,8 @@ impl Worker {
     fn start_reading(&mut self, mut stream: Box<dyn Stream>) {
         let lifetime = self.shared.start_lifetime();
         let (messages, shared) = (self.messages.clone(), Arc::clone(&self.shared));
-        self.reader = Some(std::thread::spawn(move || {
+        let alone = self.messages.clone();
+        let reader = machine::spawn("light board's port", move || {
             let mut bytes = [0; 256];
             while shared.lifetime() == lifetime {
                 let message = match stream.read_some(&mut bytes) {
@@ -392,7 +399,12 @@ impl Worker {
                     return;
                 }
             }
-        }));
+        });
+        if reader.is_err() {
+            // A board that nobody listens to is as good as gone; it is looked for again.
+            let _ = alone.send(Message::Gone(lifetime));
+        }
+        self.reader = reader.ok();
     }
 
     /// The port is gone, or nobody is behind it.
@@ -423,7 +435,8 @@ impl Worker {
         let (choice, expected, origin) = (self.choice.clone(), self.expected.clone(), self.origin);
         let last = self.shared.lock().port.clone();
         let (messages, shared) = (self.messages.clone(), Arc::clone(&self.shared));
-        std::thread::spawn(move || {
+        // Without a thread it is not found again, and the scan says that it is gone.
+        let _ = machine::spawn("light board's return", move || {
             while shared.lifetime() == lifetime {
                 std::thread::sleep(SEARCH_INTERVAL);
                 match find_again(&choice, &last, origin) {

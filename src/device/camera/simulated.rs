@@ -2,7 +2,7 @@
 
 use super::remembered::Remembered;
 use super::{Applied, Camera, CameraError, Description, Release, Settings, Shutter};
-use crate::files::FileError;
+use crate::files::{FileError, read_input_text};
 use crate::instrument::Rig;
 use crate::simulate::{Instrument, SCENE_FILE, Scene, SimulateError};
 use std::fmt;
@@ -63,7 +63,7 @@ impl Before {
 impl Table {
     /// What lies there, if that is not what lay there last.
     fn look(&mut self) -> Result<Option<Before>, SimulateError> {
-        let said = std::fs::read_to_string(self.file.with_file_name(SCENE_FILE)).ok();
+        let said = read_input_text(&self.file.with_file_name(SCENE_FILE)).ok();
         if said == self.said {
             return Ok(None);
         }
@@ -93,7 +93,7 @@ impl SimulatedCamera {
     /// # Errors
     /// Where the rig does not say what a simulation needs, or the scene cannot be read.
     pub fn over_table(rig: &Rig, file: &Path, eyes: Eyes) -> Result<Self, SimulateError> {
-        let said = std::fs::read_to_string(file.with_file_name(SCENE_FILE)).ok();
+        let said = read_input_text(&file.with_file_name(SCENE_FILE)).ok();
         let before = Before::new(rig, Scene::beside(file)?)?;
         let table = Table { rig: rig.clone(), file: file.to_owned(), said };
         Ok(Self::over(before, Some(table), eyes))

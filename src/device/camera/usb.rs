@@ -1,6 +1,7 @@
 //! Cameras on the USB as Linux shows them, for `doctor`: without opening any.
 
 use super::CameraError;
+use crate::files::read_input_text;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +64,7 @@ fn is_camera(device: &Path) -> bool {
 }
 
 fn text(path: &Path) -> Option<String> {
-    fs::read_to_string(path).ok().map(|text| text.trim().to_owned())
+    read_input_text(path).ok().map(|text| text.trim().to_owned())
 }
 
 fn name(device: &Path) -> String {

@@ -71,6 +71,11 @@ pub enum ScanError {
         /// What it may be.
         most: f64,
     },
+    /// The system gives no thread to look at frames.
+    #[error(
+        "no thread can be started to look at frames ({0}); close other programs or raise the limit (ulimit -u)"
+    )]
+    NoThread(std::io::Error),
     /// The target holds a capture session.
     #[error("{}: holds a capture session already ({name}, {frames} frames); continue it with --resume, or choose another --out", .folder.display())]
     Taken {

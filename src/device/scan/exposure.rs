@@ -5,6 +5,7 @@ use super::shoot::{Shot, Told, shoot};
 use crate::device::board::Board;
 use crate::device::camera::{Camera, Settings};
 use crate::device::look::Look;
+use crate::files::{InputKind, read_input};
 use crate::raw::{Frame, Hint, decode};
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -151,7 +152,8 @@ fn test_shot(
     let shot = shoot(board, camera, (wanted, &mut Told::default()), folder, &|_| ());
     board.off()?;
     let Shot { path, settings, .. } = shot?;
-    let bytes = std::fs::read(&path).map_err(|e| crate::files::FileError::read(&path, e))?;
+    let bytes = read_input(&path, InputKind::Picture)
+        .map_err(|e| crate::files::FileError::read(&path, e))?;
     let _ = std::fs::remove_file(&path);
     let frame = decode(&bytes, &Hint::default())
         .map_err(|error| ScanError::TestShot { why: error.to_string() })?;

@@ -1,6 +1,8 @@
 //! Looks at frames while the next one is being taken.
 
 use crate::device::look::Look;
+use crate::files::{InputKind, read_input};
+use crate::machine;
 use crate::raw::{Hint, decode};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -30,10 +32,13 @@ pub(super) struct Judge {
 
 impl Judge {
     /// For frames of this size.
-    pub(super) fn start(size_px: [usize; 2]) -> Self {
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub(super) fn start(size_px: [usize; 2]) -> std::io::Result<Self> {
         let (work, inbox) = mpsc::channel::<(usize, PathBuf)>();
         let (outbox, results) = mpsc::channel();
-        std::thread::spawn(move || {
+        machine::spawn("frames", move || {
             for (step, path) in inbox {
                 // A decoder that fails on a file must not end the scan.
                 let seen = std::panic::catch_unwind(|| judge(&path, size_px));
@@ -42,8 +47,8 @@ impl Judge {
                     return;
                 }
             }
-        });
-        Self { work, results }
+        })?;
+        Ok(Self { work, results })
     }
 
     /// Looks at a frame's file.
@@ -60,7 +65,7 @@ impl Judge {
 }
 
 fn judge(path: &Path, size_px: [usize; 2]) -> Seen {
-    let bytes = match std::fs::read(path) {
+    let bytes = match read_input(path, InputKind::Picture) {
         Ok(bytes) => bytes,
         Err(error) => return Seen::Damaged(format!("{}: {error}", path.display())),
     };

@@ -13,7 +13,7 @@ use super::subject::Subject;
 use super::summary::{Event, Seconds, Summary};
 use crate::device::board::{Board, BoardError, Failure};
 use crate::device::camera::{Camera, CameraError, Cure, Release, Settings};
-use crate::files::{FileError, shown};
+use crate::files::{FileError, InputKind, read_input, shown};
 use crate::instrument::Rig;
 use crate::raw;
 use crate::session::{FrameEntry, Session};
@@ -87,7 +87,7 @@ pub fn scan(
         rig,
         sequencer: Sequencer::new(&plan, &found.finished),
         assessor: Assessor::new(&plan),
-        judge: Judge::start(size_px),
+        judge: Judge::start(size_px).map_err(ScanError::NoThread)?,
         base: found
             .settings
             .or(options.exposure_s.map(|s| Settings { exposure_s: s, iso: options.iso })),
@@ -354,7 +354,7 @@ impl Run<'_> {
     fn keep(&mut self, step: usize) -> Input {
         let begun = Instant::now();
         let Some(shot) = self.shot.take() else { return Input::NotKept(Trouble::Lasting) };
-        let bytes = match std::fs::read(&shot.path) {
+        let bytes = match read_input(&shot.path, InputKind::Picture) {
             Ok(bytes) => bytes,
             Err(error) => {
                 let error = FileError::read(&shot.path, error).to_string();

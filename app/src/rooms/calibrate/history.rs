@@ -4,7 +4,7 @@
 use super::task::Step;
 use crate::place::Place;
 use std::path::{Path, PathBuf};
-use weavelight::files::{FileError, exchange};
+use weavelight::files::{FileError, copy_input, exchange};
 
 /// Something that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -183,7 +183,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), FileError> {
         if path.is_dir() {
             copy(&path, &target)?;
         } else {
-            std::fs::copy(&path, &target).map_err(|error| FileError::write(&target, error))?;
+            copy_input(&path, &target).map_err(|error| FileError::write(&target, error))?;
         }
     }
     Ok(())

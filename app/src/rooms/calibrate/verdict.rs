@@ -5,7 +5,7 @@ use crate::place::Place;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use weavelight::calibrate::CheckReport;
-use weavelight::files::{FileError, SCHEMA, sha256_of_file, write_atomic};
+use weavelight::files::{FileError, SCHEMA, read_input_text, sha256_of_file, write_atomic};
 use weavelight::instrument::LIGHTS_FILE;
 
 /// What the sheet that the calibration has not seen says of it.
@@ -54,7 +54,7 @@ impl Verdict {
 
     /// The one on the lights in use, if they were checked. One that cannot be read is as good as none: the check is made again.
     pub(super) fn load(place: &Place) -> Option<Self> {
-        let text = std::fs::read_to_string(file(place)).ok()?;
+        let text = read_input_text(&file(place)).ok()?;
         let verdict: Self = toml::from_str(&text).ok()?;
         let current = verdict.schema == SCHEMA
             && Some(&verdict.lights_sha256) == lights_sha256(place).as_ref();

@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 use weavelight::device::camera::Settings;
+use weavelight::files::{InputKind, read_input};
 use weavelight::instrument::Calibration;
+use weavelight::machine::spawn;
 use weavelight::raw::{Frame, Hint, decode};
 use weavelight::session::Session;
 use weavelight::solve::Exposure;
@@ -39,8 +41,9 @@ impl Eyes {
     pub(super) fn open(place: &Place, folder: &Path, out: &Outbox) -> Self {
         let (sights, inbox) = mpsc::channel();
         let (place, folder, out) = (place.clone(), folder.to_owned(), out.clone());
-        let thread = std::thread::spawn(move || watch(&inbox, &place, &folder, &out));
-        Self { sights: Some(sights), thread: Some(thread) }
+        // Without a thread there are no previews; the scan goes on.
+        let thread = spawn("previews", move || watch(&inbox, &place, &folder, &out)).ok();
+        Self { sights: Some(sights), thread }
     }
 
     pub(super) fn look_at(&self, sight: Sight) {
@@ -76,7 +79,7 @@ fn watch(inbox: &Receiver<Sight>, place: &Place, folder: &Path, out: &Outbox) {
 }
 
 fn read(file: &Path) -> Option<Frame> {
-    decode(&std::fs::read(file).ok()?, &Hint::default()).ok()
+    decode(&read_input(file, InputKind::Picture).ok()?, &Hint::default()).ok()
 }
 
 /// The maps so far, and where their pixels are.

@@ -8,7 +8,7 @@ use crate::texts::scans as texts;
 use crate::worker::{Outbox, Tools, Update};
 use eframe::egui::ColorImage;
 use std::path::{Path, PathBuf};
-use weavelight::files::{FileError, StagedFolder};
+use weavelight::files::{FileError, StagedFolder, copy_input};
 use weavelight::instrument::Calibration;
 use weavelight::raw::{Hint, decode};
 use weavelight::session::Session;
@@ -130,7 +130,7 @@ fn export(solution: &Path, to: &Path, out: &Outbox) {
             let name = file.file_name().unwrap_or_default();
             out.tick(k as f64 / files.len() as f64, &name.to_string_lossy());
             let target = staged.path().join(name);
-            std::fs::copy(file, &target).map_err(|source| FileError::write(&target, source))?;
+            copy_input(file, &target).map_err(|source| FileError::write(&target, source))?;
         }
         staged.commit()
     });

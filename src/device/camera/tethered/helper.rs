@@ -1,6 +1,7 @@
 //! The helper process: started, asked, killed.
 
 use super::protocol::{Answer, Call, Fault, Line, Moment, Request, Said};
+use crate::machine;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -44,7 +45,7 @@ impl Helper {
         let mut child = command.spawn()?;
         let (sender, lines) = mpsc::channel();
         if let Some(output) = child.stdout.take() {
-            std::thread::spawn(move || {
+            let reader = machine::spawn("camera helper", move || {
                 for line in BufReader::new(output).lines().map_while(Result::ok) {
                     let Ok(line) = serde_json::from_str(&line) else { return };
                     if sender.send(line).is_err() {
@@ -52,6 +53,11 @@ impl Helper {
                     }
                 }
             });
+            if let Err(error) = reader {
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(error);
+            }
         }
         let requests = child.stdin.take();
         Ok(Self { child, requests, lines, last_id: 0 })

@@ -37,12 +37,52 @@ pub enum Request {
     /// Take a frame and save it.
     Capture {
         /// Where to; nothing is there yet.
+        #[serde(with = "any_path")]
         file: PathBuf,
         /// The exposure that was set, seconds.
         exposure_s: f64,
         /// How long the picture may take to be announced after the end of the exposure, seconds.
         picture_within_s: f64,
     },
+}
+
+/// A path as text, or as its bytes where it is not UTF-8: JSON holds text only.
+mod any_path {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use std::path::{Path, PathBuf};
+
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Any {
+        Text(String),
+        Bytes(Vec<u8>),
+    }
+
+    pub(super) fn serialize<S: Serializer>(path: &Path, to: S) -> Result<S::Ok, S::Error> {
+        match path.to_str() {
+            Some(text) => to.serialize_str(text),
+            None => path.as_os_str().as_encoded_bytes().serialize(to),
+        }
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<PathBuf, D::Error> {
+        match Any::deserialize(from)? {
+            Any::Text(text) => Ok(text.into()),
+            Any::Bytes(bytes) => of_bytes(bytes).ok_or_else(|| D::Error::custom("no path")),
+        }
+    }
+
+    #[cfg(unix)]
+    fn of_bytes(bytes: Vec<u8>) -> Option<PathBuf> {
+        use std::os::unix::ffi::OsStringExt;
+        Some(std::ffi::OsString::from_vec(bytes).into())
+    }
+
+    #[cfg(not(unix))]
+    fn of_bytes(bytes: Vec<u8>) -> Option<PathBuf> {
+        String::from_utf8(bytes).ok().map(PathBuf::from)
+    }
 }
 
 /// What a capture session fixes at the camera.

@@ -262,7 +262,7 @@ fn judge(file: &Path, path: &Path) -> Verdict {
     if is_companion(path) {
         return Verdict::NotRaw;
     }
-    let bytes = match fs::read(file) {
+    let bytes = match crate::files::read_input(file, crate::files::InputKind::Picture) {
         Ok(bytes) => bytes,
         Err(error) => return Verdict::Incomplete(error.to_string()),
     };
