@@ -99,12 +99,12 @@ fn said_by_code_points(points: &CodingIndependentCodePoints) -> Said {
         5 => tone(Tone::Gamma(2.8)),
         8 => Curve::Linear,
         13 => Curve::Srgb,
-        16 => return Said::unreadable("it says PQ", by),
-        18 => return Said::unreadable("it says HLG", by),
-        other => return Said::unreadable(format!("it says transfer function {other}"), by),
+        16 => return Said::unreadable("PQ is not read", by),
+        18 => return Said::unreadable("HLG is not read", by),
+        other => return Said::unreadable(format!("transfer function {other} is not read"), by),
     };
     if !points.is_video_full_range_image {
-        return Said::unreadable("it says narrow range", by);
+        return Said::unreadable("narrow range is not read", by);
     }
     let primaries = match points.color_primaries {
         1 => Some((BT_709, D65)),

@@ -80,6 +80,8 @@ pub struct Numbers {
     pub may_clip_below: bool,
     /// Bits that carry information, where the file says that there are fewer than it stores, and the samples are as stored.
     pub significant_bits: Option<u8>,
+    /// The curve that was undone, as in "sRGB"; empty for a RAW file.
+    pub curve: String,
     /// The encoding that the file names and that was applied, where it is one of the two with a name.
     pub encoding: Option<Encoding>,
     /// Both words, where the declared encoding is not the file's, as in "its sRGB chunk says sRGB, declared is linear".

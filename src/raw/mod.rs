@@ -29,7 +29,7 @@ pub use demosaic::demosaic;
 pub use error::{DecodeError, ReadError};
 pub use frame::{Frame, Layout, Metadata, Numbers, Samples};
 pub use hint::{Encoding, Hint};
-pub use picture::contradictions;
+pub use picture::{contradictions, mixed_encodings};
 pub use preview::preview;
 pub use read::{Source, read, read_all, read_source};
 

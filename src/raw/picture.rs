@@ -129,6 +129,7 @@ fn numbers(picture: &Picture, applied: &Curve, hint: &Hint) -> Numbers {
     Numbers {
         may_clip_below: integers,
         significant_bits: picture.significant_bits.filter(|_| *applied == Curve::Linear),
+        curve: applied.name(),
         encoding: match (hint.encoding, said.filter(|_| integers)) {
             (None, Some(Curve::Linear)) => Some(Encoding::Linear),
             (None, Some(Curve::Srgb)) => Some(Encoding::Srgb),
@@ -170,5 +171,21 @@ pub fn contradictions<'a>(
     Some(format!(
         "{}{others}: {what}. It is read as declared; if the file is right, remove the declaration.",
         path.display()
+    ))
+}
+
+/// One sentence for pictures of one set that were not read by one curve.
+pub fn mixed_encodings<'a>(
+    pictures: impl Iterator<Item = (&'a Path, &'a Numbers)>,
+) -> Option<String> {
+    let mut read = pictures.filter(|(_, numbers)| !numbers.curve.is_empty());
+    let (first, of_first) = read.next()?;
+    let (other, of_other) = read.find(|(_, numbers)| numbers.curve != of_first.curve)?;
+    Some(format!(
+        "{} is read as {}, but {} as {}, as each file says or by default: if one of them is wrong, declare one encoding for all.",
+        first.display(),
+        of_first.curve,
+        other.display(),
+        of_other.curve
     ))
 }

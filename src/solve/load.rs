@@ -9,7 +9,7 @@ use super::{Options, SolveError};
 use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
 use crate::machine::check_memory;
 use crate::raster::decode_mask;
-use crate::raw::{Frame, Histogram, ReadError, Samples, contradictions};
+use crate::raw::{Frame, Histogram, ReadError, Samples, contradictions, mixed_encodings};
 use crate::session::{FrameEntry, Kind, Session, SessionError};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -52,9 +52,11 @@ pub(crate) fn load(
     warnings.extend(stale_lights(&calibration)?);
     let frames = read_frames(session, progress)?;
     warnings.extend(other_optics(session, &frames, &calibration));
-    let numbers = session.frames.iter().zip(&frames);
-    let numbers = numbers.map(|(entry, frame)| (entry.file.as_path(), &frame.metadata.numbers));
-    warnings.extend(contradictions(numbers));
+    let entries = || session.frames.iter().zip(&frames);
+    let numbers =
+        || entries().map(|(entry, frame)| (entry.file.as_path(), &frame.metadata.numbers));
+    warnings.extend(contradictions(numbers()));
+    warnings.extend(mixed_encodings(numbers()));
     warnings.extend(find_ceiling(&frames, &mut calibration));
     let (drift, frames): (Vec<_>, Vec<_>) =
         session.frames.iter().zip(frames).partition(|(entry, _)| entry.drift_check);

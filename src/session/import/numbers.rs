@@ -2,7 +2,7 @@
 
 use super::Encoding;
 use crate::instrument::Color;
-use crate::raw::{self, Ceiling, Histogram, Numbers, contradictions};
+use crate::raw::{self, Ceiling, Histogram, Numbers, contradictions, mixed_encodings};
 use nalgebra::Matrix3;
 use std::path::{Path, PathBuf};
 
@@ -27,13 +27,14 @@ impl Gathered {
 
     /// Sentences for the user.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let pictures = self.pictures.iter().map(|(path, numbers)| (path.as_path(), numbers));
+        let pictures = || self.pictures.iter().map(|(path, numbers)| (path.as_path(), numbers));
         let mixed = self.primaries().is_err().then(|| {
             "The pictures differ in their primaries: no colour matrix is written, and colours stay those of the pictures."
                 .to_owned()
         });
         let ceiling = self.ceiling().map(|ceiling| ceiling.sentence());
-        contradictions(pictures).into_iter().chain(mixed).chain(ceiling).collect()
+        let of_curves = contradictions(pictures()).into_iter().chain(mixed_encodings(pictures()));
+        of_curves.chain(mixed).chain(ceiling).collect()
     }
 
     /// What a calibration should say of them.

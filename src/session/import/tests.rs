@@ -285,6 +285,18 @@ fn pictures_that_say_their_encoding_are_read_by_it() {
 }
 
 #[test]
+fn pictures_of_two_encodings_are_named() {
+    let names = ["a.png", "b.png", "c.png"];
+    let set = Set::new("lights.txt", DIRECTIONS, &names);
+    write_png_rgb16(&set.path("b.png"), [4, 3], PngContent::Srgb, |_, row| row.fill([900; 3]))
+        .unwrap();
+    let (_, summary) = set.import(&set.options("lights.txt", &names)).unwrap();
+    let [curves, primaries] = &summary.warnings[..] else { panic!("{:?}", summary.warnings) };
+    assert!(curves.contains("a.png is read as linear, but ") && curves.contains("b.png as sRGB"));
+    assert!(primaries.starts_with("The pictures differ in their primaries"), "{primaries}");
+}
+
+#[test]
 fn twelve_bits_in_sixteen_clip_at_4095() {
     let names = ["a.png", "b.png", "c.png"];
     let import = |peak: f64, most: f64| {
