@@ -1,6 +1,6 @@
 //! What is refused: which picture, why, what to photograph instead; and the old calibration stands as it was.
 
-use super::bench::{Bench, Picture, WHITE, edit};
+use super::bench::{Bench, Picture, edit};
 use weavelight::calibrate::CalibrateError;
 use weavelight::simulate::{Options, Part};
 
@@ -61,15 +61,10 @@ fn flawed_sheets() {
 
 #[test]
 fn sheets_that_all_lie_alike() {
-    // Three sheets, none raised, none tilted: no more than one.
-    let bench = Bench::new(&WHITE, |o| {
-        o.targets.raised_mm = 0.0;
-        o.targets.tilt_deg = 0.0;
-        o.targets.tilts = 1;
-        o.targets.state_planes = false;
-    });
-    let three = ["white-flat", "white-raised", "white-tilt-1"];
-    refused(&bench, |bench| bench.lights(&three), &["all 3", "same pose", "raised", "tilted"]);
+    // Two sheets, none raised, none tilted: no more than one.
+    let bench = Bench::new(&[Part::WhiteFlat, Part::WhiteRaised], |o| o.targets.raised_mm = 0.0);
+    let two = ["white-flat", "white-raised"];
+    refused(&bench, |bench| bench.lights(&two), &["all 2", "same pose", "raised", "tilted"]);
 }
 
 /// Of six boards, the first on the table.
