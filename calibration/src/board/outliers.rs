@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn corners_beside_glare_are_told_wherever_they_are() {
-        for moved in [&[0][..], &[8], &[22], &[53], &[0, 1], &[44, 52, 53]] {
+        for moved in [&[0][..], &[8], &[22], &[53], &[0, 1], &[13, 40]] {
             let mut corners = seen();
             for k in moved {
                 corners[*k][0] += 1.8;
