@@ -28,7 +28,7 @@ use std::path::PathBuf;
 use weavelight_calibration::description::{Camera, Image, Light};
 
 /// How many lights a rig has.
-pub const LIGHT_COUNT: RangeInclusive<usize> = 3..=64;
+pub const LIGHT_COUNT: RangeInclusive<usize> = 3..=256;
 
 /// `rig.toml`: the instrument as the technician describes it.
 #[derive(Clone, Debug, PartialEq)]

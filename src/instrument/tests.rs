@@ -131,7 +131,7 @@ fn impossible_rigs_are_told_with_line_and_remedy() {
     check_rig(
         "[[lights]]\nposition_mm = [0, 0, 100]\n",
         "",
-        "rig.toml:5: `lights` are 2; a rig has 3 to 64",
+        "rig.toml:5: `lights` are 2; a rig has 3 to 256",
     );
     check_rig(
         "[0, 0, 100]\n",

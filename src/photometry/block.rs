@@ -7,6 +7,7 @@
 
 use std::ops::Range;
 
+use super::light_set::LightSet;
 use super::method::{RELATIVE_FLOOR, START_LEVEL};
 use super::pieces::Pieces;
 use super::row::{RowInput, VarianceModel};
@@ -157,11 +158,11 @@ impl Block {
         self.find_level();
     }
 
-    /// Leaves only samples that had a weight and are not in these sets (bit i for light i), for this solve and those to come.
-    pub(crate) fn keep_others(&mut self, dropped: &[u64; LANES]) {
+    /// Leaves only samples that had a weight and are not in these sets, for this solve and those to come.
+    pub(crate) fn keep_others(&mut self, dropped: &[LightSet; LANES]) {
         for (i, sample) in self.sample.iter_mut().enumerate() {
             for k in 0..LANES {
-                if dropped[k] >> i & 1 == 1 {
+                if dropped[k].contains(i) {
                     sample.weight[k] = 0.0;
                 }
                 sample.usable[k] = if sample.weight[k] > 0.0 { 1.0 } else { 0.0 };
@@ -187,13 +188,13 @@ impl Block {
         self.sample.iter().filter(|sample| sample.finite[k] > 0.0).count()
     }
 
-    /// Bit i is set if light i had a weight in the latest solve of lane `k`; neighbours keep every light.
-    pub(crate) fn kept(&self, k: usize) -> u64 {
+    /// Lights that had a weight in the latest solve of lane `k`; neighbours keep every light.
+    pub(crate) fn kept(&self, k: usize) -> LightSet {
         if self.neighbours {
-            return u64::MAX >> (64 - self.sample.len());
+            return LightSet::first(self.sample.len());
         }
         let lights = self.sample.iter().enumerate();
-        lights.filter(|(_, sample)| sample.weight[k] > 0.0).fold(0, |kept, (i, _)| kept | 1 << i)
+        lights.filter(|(_, sample)| sample.weight[k] > 0.0).map(|(i, _)| i).collect()
     }
 
     /// Whether no photosite has any signal.

@@ -15,7 +15,7 @@ pub enum Method {
 }
 
 /// Most lights of a rig.
-pub const MAX_LIGHTS: usize = 64;
+pub const MAX_LIGHTS: usize = 256;
 
 /// Weighted solves after the plain start, each with the weights of the fit before it, where noise does not explain the first
 /// with every sample. (Where it does, one is enough: a second lets the noise of dim samples choose their weights, which
@@ -83,8 +83,23 @@ pub(crate) const SEARCH_SAMPLES: usize = 5;
 pub(crate) fn chi_square_limit(freedom: usize) -> f64 {
     match freedom {
         0 => f64::INFINITY,
-        _ => CHI_SQUARE_999[(freedom - 1).min(CHI_SQUARE_999.len() - 1)],
+        _ => CHI_SQUARE_999.get(freedom - 1).copied().unwrap_or_else(|| chi_square_of_many(freedom)),
     }
+}
+
+/// The same beyond the table, to 0.001: Goldberg and Levine, "Approximate Formulas for the Percentage Points and
+/// Normalization of t and chi-square", Annals of Mathematical Statistics 17, 1946.
+fn chi_square_of_many(freedom: usize) -> f64 {
+    /// The standard normal's quantile of 0.999.
+    const Z: f64 = 3.090_232_306;
+    let k = freedom as f64;
+    let root = (2.0 * k).sqrt();
+    let [z2, z3, z4, z5] = [Z.powi(2), Z.powi(3), Z.powi(4), Z.powi(5)];
+    k + Z * root
+        + 2.0 / 3.0 * (z2 - 1.0)
+        + (z3 - 7.0 * Z) / (9.0 * root)
+        - (6.0 * z4 + 14.0 * z2 - 32.0) / (405.0 * k)
+        + (9.0 * z5 + 256.0 * z3 - 433.0 * Z) / (4860.0 * root * k)
 }
 
 #[rustfmt::skip]
@@ -98,3 +113,20 @@ const CHI_SQUARE_999: [f64; 61] = [
     85.3506, 86.6608, 87.9680, 89.2722, 90.5734, 91.8718, 93.1675, 94.4605,
     95.7510, 97.0388, 98.3242, 99.6072, 100.8879,
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles by bisection of the incomplete gamma function; the table and the series meet without a step.
+    #[test]
+    fn limits_beyond_the_table_are_those_of_the_distribution() {
+        assert!((chi_square_of_many(61) - 100.8879).abs() < 1e-3);
+        assert!((chi_square_of_many(20) - 45.3147).abs() < 5e-3);
+        for (freedom, expected) in [(62, 102.1662), (93, 140.8931), (128, 183.1864), (253, 328.2456)] {
+            let found = chi_square_limit(freedom);
+            assert!((found - expected).abs() < 1e-3, "{freedom}: {found}, not {expected}");
+        }
+        assert!((61..253).all(|k| chi_square_limit(k) < chi_square_limit(k + 1)));
+    }
+}

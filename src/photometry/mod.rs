@@ -17,6 +17,7 @@ mod block;
 mod complete;
 mod elsewhere;
 mod least_squares;
+mod light_set;
 mod method;
 mod noise;
 mod normal_equations;
@@ -39,6 +40,7 @@ pub(crate) mod tests;
 pub use elsewhere::{CutPiece, CutRow, Found};
 #[cfg(feature = "gpu")]
 pub(crate) use method::chi_square_limit;
+pub use light_set::LightSet;
 pub use method::{MAX_LIGHTS, Method};
 pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};

@@ -3,6 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::light_set::LightSet;
 use super::method::{
     BEHIND_DEVIATIONS, BEHIND_LEVEL, CLEAR_DEVIATIONS, COPLANAR_CONDITION, FEWEST_KEPT,
     LIT_ABOVE_FLOOR, MAX_LIGHTS, MOST_LENGTHENING, Method, RELATIVE_FLOOR, REWEIGHTINGS,
@@ -65,14 +66,14 @@ pub(crate) struct Solution {
     pub(crate) weights: [f64; MAX_LIGHTS],
     /// The fit that albedo is taken from, where it is another one: g and its covariance.
     pub(crate) clear: Option<(Vector3<f64>, Matrix3<f64>)>,
-    /// Bit i is set if the subset test dropped the sample of light i.
-    pub(crate) dropped: u64,
+    /// Lights whose samples the subset test dropped.
+    pub(crate) dropped: LightSet,
 }
 
 impl Solution {
     fn support(&self) -> Support {
         let lights = self.weights.iter().enumerate();
-        let kept = lights.filter(|(_, w)| **w > 0.0).fold(0, |kept, (i, _)| kept | 1 << i);
+        let kept = lights.filter(|(_, w)| **w > 0.0).map(|(i, _)| i).collect();
         Support { kept, dropped: self.dropped }
     }
 }
@@ -138,7 +139,7 @@ impl Samples<'_> {
             }
         }
         let inverse = inverse_if_conditioned(&normal_matrix)?;
-        Some(Solution { g: inverse * right, inverse, weights, clear: None, dropped: 0 })
+        Some(Solution { g: inverse * right, inverse, weights, clear: None, dropped: LightSet::NONE })
     }
 
     /// Weighted solution; `plain` is the solution with every usable sample. Where all samples are there, noise explains the

@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::light_set::LightSet;
 use super::method::{
     DARK_SHARE, DROP_PENALTY, FEWEST_KEPT, LEAST_DETERMINANT, MAX_LIGHTS, MOST_DROPPED,
     MOST_LIGHTS_EXACT, SEARCH_SAMPLES, chi_square_limit,
@@ -159,9 +160,8 @@ impl Samples<'_> {
     }
 }
 
-/// Bit i is set if light i is among them.
-fn set_of(lights: &Lights) -> u64 {
-    lights.iter().enumerate().fold(0, |set, (i, is_in)| set | u64::from(*is_in) << i)
+fn set_of(lights: &Lights) -> LightSet {
+    (0..MAX_LIGHTS).filter(|&light| lights[light]).collect()
 }
 
 /// What a search found: the fit without the samples it dropped.

@@ -5,6 +5,7 @@
 use multiversion::multiversion;
 
 use super::block::{Block, LANES, Lanes, ZERO, larger};
+use super::light_set::LightSet;
 use super::method::{DARK_SHARE, MAX_LIGHTS, MOST_LIGHTS_EXACT, SEARCH_SAMPLES};
 use super::normal_equations::{Weighting, accumulate, improve};
 use super::row::Outcome;
@@ -43,12 +44,12 @@ impl RobustSolver {
         solved
     }
 
-    fn search(&mut self, block: &Block) -> [u64; LANES] {
-        let mut dropped = [0; LANES];
+    fn search(&mut self, block: &Block) -> [LightSet; LANES] {
+        let mut dropped = [LightSet::NONE; LANES];
         for first in (0..block.len).step_by(WIDE) {
             self.samples.take(block, first);
             let found = if block.sample.len() <= MOST_LIGHTS_EXACT {
-                best_subset(&mut self.search, &self.samples)
+                best_subset(&mut self.search, &self.samples).map(LightSet::from)
             } else {
                 tighten(&self.samples)
             };
@@ -82,8 +83,8 @@ fn first_weights(block: &mut Block, median: &Lanes) {
 /// The middle usable sample, the upper one of two.
 fn medians(block: &Block) -> Lanes {
     let mut median = ZERO;
+    let mut values = [0.0_f32; MAX_LIGHTS];
     for k in 0..block.len {
-        let mut values = [0.0_f32; MAX_LIGHTS];
         let mut count = 0;
         for sample in block.sample.iter().filter(|sample| sample.usable[k] > 0.0) {
             values[count] = sample.y[k];
@@ -97,12 +98,12 @@ fn medians(block: &Block) -> Lanes {
 }
 
 /// Which samples of each photosite were dropped, and what they have in common.
-fn judge(block: &Block, dropped: &[u64; LANES], solved: &mut Weighted) {
+fn judge(block: &Block, dropped: &[LightSet; LANES], solved: &mut Weighted) {
     for k in 0..block.len {
         solved.surface.dropped[k] = dropped[k];
         let (mut dark, mut bright) = (false, false);
         for (_, sample) in
-            block.sample.iter().enumerate().filter(|&(i, _)| dropped[k] >> i & 1 == 1)
+            block.sample.iter().enumerate().filter(|&(i, _)| dropped[k].contains(i))
         {
             let above = sample.y[k] > solved.surface.predicted(sample, k);
             bright |= above;

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use super::light_set::LightSet;
 use super::method::MAX_LIGHTS;
 
 /// One row of photosites, as every kernel reads it.
@@ -31,7 +32,7 @@ pub struct FieldRow<'a> {
     pub step: usize,
     /// `nodes * lights` vectors, node-major.
     pub vectors: &'a [[f64; 3]],
-    /// Lights, 3 to 64.
+    /// Lights, 3 to [`MAX_LIGHTS`].
     pub lights: usize,
 }
 
@@ -104,14 +105,14 @@ pub struct RowOutput<'a> {
     pub support: Option<&'a mut [Support]>,
 }
 
-/// Which samples a fit rests on; bit i stands for light i. A usable sample in neither set was set aside before any test: the
+/// Which samples a fit rests on. A usable sample in neither set was set aside before any test: the
 /// fit has the surface turned away from its light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Support {
     /// Samples that took part.
-    pub kept: u64,
+    pub kept: LightSet,
     /// Samples that the subset test dropped, because they contradict the rest.
-    pub dropped: u64,
+    pub dropped: LightSet,
 }
 
 impl RowOutput<'_> {
@@ -160,7 +161,7 @@ pub enum Outcome {
 /// A row whose parts do not belong together.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum RowError {
-    /// Fewer than 3 or more than 64 lights.
+    /// Fewer than 3 or more than [`MAX_LIGHTS`] lights.
     #[error("a row has {lights} lights; the kernels take 3 to {MAX_LIGHTS}")]
     Lights {
         /// Lights of the field.

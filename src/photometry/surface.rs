@@ -1,6 +1,7 @@
 //! What a block's solve found, and how it is written to the row.
 
 use super::block::{Block, LANES, Lanes, Sample, ZERO};
+use super::light_set::LightSet;
 use super::reference::MOST_ERROR_DEG;
 use super::row::{Outcome, RowOutput, Support};
 
@@ -16,8 +17,8 @@ pub(crate) struct Surface {
     pub(crate) carried: [bool; LANES],
     /// What the subset test says of a solved photosite.
     pub(crate) outcome: [Outcome; LANES],
-    /// Samples that it dropped, bit i for light i.
-    pub(crate) dropped: [u64; LANES],
+    /// Samples that it dropped.
+    pub(crate) dropped: [LightSet; LANES],
     /// See [`MOST_LENGTHENING`](super::method::MOST_LENGTHENING); 0 leaves the albedo as it is.
     pub(crate) most_lengthening: f32,
     /// Albedo of the lights clear of the horizon over that of all; see [`CLEAR_DEVIATIONS`](super::method::CLEAR_DEVIATIONS).
@@ -47,7 +48,7 @@ impl Surface {
             count: ZERO,
             carried,
             outcome,
-            dropped: [0; LANES],
+            dropped: [LightSet::NONE; LANES],
             most_lengthening,
             albedo_share: [1.0; LANES],
         }

@@ -6,6 +6,7 @@
 
 use multiversion::multiversion;
 
+use super::light_set::LightSet;
 use super::method::{DROP_PENALTY, FEWEST_KEPT};
 use super::subset::{WIDE, WIDE_ZERO, Whitened, Wide, wide_times};
 
@@ -56,9 +57,9 @@ pub(crate) fn tightened_weight(square: f64, mu: f64) -> f64 {
     }
 }
 
-/// Per photosite the set of lights (bit i for light i) that remain outside when the cost has been tightened.
+/// Per photosite the set of lights that remain outside when the cost has been tightened.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(crate) fn tighten(samples: &Whitened) -> [u64; WIDE] {
+pub(crate) fn tighten(samples: &Whitened) -> [LightSet; WIDE] {
     let sums = samples.sums(|i| samples.used[i]);
     let mut g = wide_times(&sums.inverse(), &sums.right);
     let mut running = [true; WIDE];
@@ -105,13 +106,13 @@ fn largest_squares(samples: &Whitened, g: &[Wide; 3]) -> Wide {
     largest
 }
 
-fn outside(samples: &Whitened, g: &[Wide; 3]) -> [u64; WIDE] {
-    let mut dropped = [0; WIDE];
+fn outside(samples: &Whitened, g: &[Wide; 3]) -> [LightSet; WIDE] {
+    let mut dropped = [LightSet::NONE; WIDE];
     for i in 0..samples.y.len() {
         let residual = samples.residual(i, g);
         for k in 0..WIDE {
             let drop = samples.used[i][k] > 0.0 && residual[k] * residual[k] > DROP_PENALTY;
-            dropped[k] |= u64::from(drop) << i;
+            dropped[k].insert_if(i, drop);
         }
     }
     dropped

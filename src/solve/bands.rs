@@ -498,7 +498,7 @@ fn albedo_of_channels(
     for (column, rgb) in rgb.iter_mut().enumerate() {
         let normal = nalgebra::Vector3::from(output.normal[column]).cast::<f64>();
         let (mut along, mut square) = ([0.0; 3], 0.0);
-        for light in (0..field.lights).filter(|light| support[column].kept >> light & 1 == 1) {
+        for light in (0..field.lights).filter(|light| support[column].kept.contains(*light)) {
             let shading = field.at(column, light).dot(&normal);
             square += shading * shading;
             for (channel, along) in along.iter_mut().enumerate() {

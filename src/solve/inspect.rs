@@ -83,7 +83,7 @@ impl Rows<'_> {
                 light: light.index,
                 measured,
                 predicted: predicted.map(|p| p.max(0.0)),
-                part: part(measured, predicted, support, 1 << k),
+                part: part(measured, predicted, &support, k),
             }
         });
         Some(Photosite {
@@ -149,13 +149,13 @@ impl Rows<'_> {
     }
 }
 
-/// What the solver did with a sample; `predicted` is negative where the surface turns away, `light` the light's bit.
-fn part(measured: Option<f32>, predicted: Option<f32>, support: Support, light: u64) -> Part {
+/// What the solver did with a sample; `predicted` is negative where the surface turns away, `light` the light's place in the scene.
+fn part(measured: Option<f32>, predicted: Option<f32>, support: &Support, light: usize) -> Part {
     match (measured, predicted) {
         (None, _) => Part::Unusable,
         (_, None) => Part::Unsolved,
-        _ if support.kept & light != 0 => Part::Used,
-        _ if support.dropped & light == 0 => Part::TurnedAway,
+        _ if support.kept.contains(light) => Part::Used,
+        _ if !support.dropped.contains(light) => Part::TurnedAway,
         (Some(measured), Some(predicted)) if measured > predicted => Part::TooBright,
         _ => Part::TooDark,
     }

@@ -11,7 +11,7 @@ use super::in_memory::light_field;
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::signal::{Normalizer, SignalRows};
 use crate::instrument::Calibration;
-use crate::photometry::FieldRow;
+use crate::photometry::{FieldRow, LightSet};
 use crate::raw::{Frame, Layout, demosaic};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -46,8 +46,8 @@ pub struct Accumulator {
     height: usize,
     /// Per channel that a pixel has: sum of l y, row by row.
     sums: Vec<Vec<[f32; 3]>>,
-    /// Per pixel: bit i set where light i clipped.
-    lost: Vec<u64>,
+    /// Per pixel: the lights that clipped.
+    lost: Vec<LightSet>,
     /// Lights that were added, ascending.
     arrived: Vec<usize>,
 }
@@ -93,7 +93,7 @@ impl Accumulator {
             width,
             height,
             sums: vec![vec![[0.0; 3]; width * height]; channels],
-            lost: vec![0; width * height],
+            lost: vec![LightSet::NONE; width * height],
             arrived: vec![],
         }
     }
@@ -247,8 +247,8 @@ impl Accumulator {
         for x in 0..self.width {
             let at = y * self.width + x;
             let column = centre(x, self.scale, self.scene.width);
-            let exact = (self.lost[at] != 0)
-                .then(|| self.matrices_without_lost(&field, column, self.lost[at]));
+            let exact = (!self.lost[at].is_empty())
+                .then(|| self.matrices_without_lost(&field, column, &self.lost[at]));
             let [n, inverse] = exact.unwrap_or_else(|| between(&matrices, field.step, column));
             let b = |channel: usize| Vector3::from(self.sums[channel][at]);
             let g = inverse * (0..self.sums.len()).map(b).sum::<Vector3<f32>>();
@@ -268,9 +268,9 @@ impl Accumulator {
         &self,
         field: &FieldRow,
         column: usize,
-        lost: u64,
+        lost: &LightSet,
     ) -> [Matrix3<f32>; 2] {
-        let kept = self.arrived.iter().enumerate().filter(|(_, light)| lost >> **light & 1 == 0);
+        let kept = self.arrived.iter().enumerate().filter(|(_, light)| !lost.contains(**light));
         let vectors: Vec<Vector3<f64>> =
             kept.map(|(position, _)| field.at(column, position)).collect();
         match vectors.len() {
@@ -298,7 +298,7 @@ impl Worker<'_, '_> {
         scale: usize,
         row: usize,
         sums: &mut [&mut [[f32; 3]]],
-        (lost, light): (&mut [u64], usize),
+        (lost, light): (&mut [LightSet], usize),
     ) {
         self.bin(scene, normalizer, scale, row, sums.len(), lost.len());
         let field = self.field.row(centre(row, scale, scene.height), 0);
@@ -312,7 +312,7 @@ impl Worker<'_, '_> {
         }
         for (x, lost) in lost.iter_mut().enumerate() {
             if self.bins.iter().any(|bins| !bins[x].is_finite()) {
-                *lost |= 1 << light;
+                lost.insert(light);
             }
         }
     }

@@ -78,9 +78,13 @@ fn fast_weighted_is_the_reference() {
 
 #[test]
 fn fast_subset_test_is_the_reference() {
-    for (lights, name) in
-        [(reference_lights(), "ten"), (many_lights(20), "twenty"), (many_lights(5), "five")]
-    {
+    for (lights, name) in [
+        (reference_lights(), "ten"),
+        (many_lights(20), "twenty"),
+        (many_lights(5), "five"),
+        (many_lights(96), "ninety-six"),
+        (many_lights(256), "most"),
+    ] {
         let mut random = Random::new(6);
         let mut scene = Scene::new(&lights, 300, 64, |_| {
             let tilt = random.between(0.0, 60.0);

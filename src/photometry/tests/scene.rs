@@ -3,7 +3,7 @@
 use nalgebra::{Rotation3, Unit, Vector3};
 
 use crate::photometry::{
-    FieldRow, Method, Outcome, RowInput, RowOutput, RowSolver, Support, VarianceModel,
+    FieldRow, LightSet, Method, Outcome, RowInput, RowOutput, RowSolver, Support, VarianceModel,
     reference_row,
 };
 
@@ -156,17 +156,17 @@ impl Scene {
 
     /// Spoils `count` lit samples of every photosite before the noise comes: shadow of 0 to 30 % or highlight of 150 to 400 %.
     /// Returns which.
-    pub(crate) fn spoil(&mut self, count: usize, random: &mut Random) -> Vec<u64> {
-        let mut spoilt = vec![0; self.width];
+    pub(crate) fn spoil(&mut self, count: usize, random: &mut Random) -> Vec<LightSet> {
+        let mut spoilt = vec![LightSet::NONE; self.width];
         for column in 0..self.width {
             let brightest = (0..self.lights).map(|i| self.clean(i, column)).fold(0.0, f64::max);
             let lit: Vec<usize> =
                 (0..self.lights).filter(|&i| self.clean(i, column) > 0.02 * brightest).collect();
             let spare = lit.len().saturating_sub(4);
-            while u64::count_ones(spoilt[column]) < count.min(spare) as u32 {
+            while spoilt[column].len() < count.min(spare) {
                 let light = lit[random.below(lit.len())];
-                if spoilt[column] >> light & 1 == 0 {
-                    spoilt[column] |= 1 << light;
+                if !spoilt[column].contains(light) {
+                    spoilt[column].insert(light);
                     let shadow = random.below(2) == 0;
                     let factor =
                         if shadow { random.between(0.0, 0.3) } else { random.between(1.5, 4.0) };
@@ -222,7 +222,7 @@ impl Solved {
             expected_error_deg: vec![f32::NAN; width],
             residual: vec![f32::NAN; width],
             outcome: vec![Outcome::Masked; width],
-            support: vec![Support { kept: u64::MAX, dropped: u64::MAX }; width],
+            support: vec![Support { kept: LightSet::first(9), dropped: LightSet::first(9) }; width],
         }
     }
 

@@ -83,6 +83,7 @@ fn every_kind_of_scene_comes_out_the_same() {
         ("far", Recipe { seed: 6, directional: true, layout: gbrg, ..plain }),
         ("three lights", Recipe { seed: 7, lights: 3, ..plain }),
         ("64 lights", Recipe { seed: 8, lights: 64, width: 21, height: 9, ..plain }),
+        ("256 lights", Recipe { seed: 8, lights: 256, width: 21, height: 9, ..plain }),
         ("wide", Recipe { seed: 9, mm_per_px: 0.08, width: 131, height: 140, ..plain }),
         ("one row", Recipe { seed: 10, height: 1, ..plain }),
         ("one pixel", Recipe { seed: 11, width: 1, height: 1, ..plain }),

@@ -97,6 +97,10 @@ fn the_fast_run_agrees_with_float64_at_every_pixel() {
             method,
         );
         check_against_reference(
+            Recipe { seed: 8, lights: 256, width: 21, height: 9, ..plain },
+            method,
+        );
+        check_against_reference(
             Recipe { seed: 9, mm_per_px: 0.08, width: 131, height: 70, ..plain },
             method,
         );
