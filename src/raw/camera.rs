@@ -3,7 +3,8 @@
 use super::error::CONVERT_TO_DNG;
 use super::sensor::{self, Area, Stored};
 use super::tags::Tiff;
-use super::{DecodeError, Hint, Layout, Metadata, metadata};
+use super::{DecodeError, FRAMES, Hint, Layout, Metadata, Samples, kind, metadata};
+use crate::raster::PictureError;
 use crate::raster::guard::guarded_pool;
 use rawloader::{RawImage, RawImageData};
 use weavelight_calibration::description::{Cfa, Channel};
@@ -32,32 +33,44 @@ pub(crate) fn decode(
     tiff: Option<&Tiff>,
     hint: &Hint,
 ) -> Result<Stored, DecodeError> {
+    let image = load(bytes, tiff, Want::Everything)?;
     sensor::linear_only(hint, "a RAW file")?;
-    let image = load(bytes, Want::Everything)?;
     let mut stored = describe(&image, tiff, hint)?;
-    stored.samples = integers(image.data)?;
-    if stored.samples.len() != stored.width * stored.height * stored.layout.channels() {
+    let samples = integers(image.data)?;
+    let found = samples.len();
+    stored.samples = Samples::U16(samples);
+    if found != stored.width * stored.height * stored.layout.channels() {
         return Err(DecodeError::damaged("its decoder returned another number of samples"));
     }
     Ok(stored)
 }
 
 /// rawloader's view of a file.
-pub(crate) fn load(bytes: &[u8], want: Want) -> Result<RawImage, DecodeError> {
-    guarded_pool(|| {
+pub(crate) fn load(bytes: &[u8], tiff: Option<&Tiff>, want: Want) -> Result<RawImage, DecodeError> {
+    let outcome = guarded_pool(|| {
         let mut reader = bytes;
         let image = match want {
             Want::Everything => rawloader::decode(&mut reader),
             Want::Description => rawloader::decode_dummy(&mut reader),
         };
-        // rawloader's own words run over several lines and name its issue tracker.
-        image.map_err(|error| {
-            let text = error.to_string();
-            let line = text.lines().next().unwrap_or_default();
-            let reason: String = line.trim_end_matches('.').chars().take(160).collect();
-            DecodeError::unsupported(format!("this RAW file ({reason})"), CONVERT_TO_DNG)
-        })
+        image.map_err(|error| refused(bytes, tiff, &error.to_string()))
+    });
+    // A decoder that gives up may have met a newer kind as well as damage.
+    outcome.map_err(|error| match error {
+        DecodeError::Picture(PictureError::Damaged { .. }) if kind::name(bytes, tiff).is_some() => {
+            kind::refused(bytes, tiff, Some("that is damaged or of a newer kind"))
+        }
+        error => error,
     })
+}
+
+/// rawloader's own words are for its developers, run over several lines and name its issue tracker.
+fn refused(bytes: &[u8], tiff: Option<&Tiff>, text: &str) -> DecodeError {
+    if text.contains("Couldn't find a decoder") && kind::name(bytes, tiff).is_none() {
+        return PictureError::NotAPicture { found: "a file of unknown kind", expected: FRAMES }.into();
+    }
+    let unknown = text.contains("Couldn't find camera");
+    kind::refused(bytes, tiff, unknown.then_some("of a camera that is not known"))
 }
 
 /// Everything but the samples.
@@ -83,7 +96,7 @@ pub(crate) fn describe(
     Ok(Stored {
         width: image.width,
         height: image.height,
-        samples: Vec::new(),
+        samples: Samples::U16(Vec::new()),
         visible,
         layout,
         black: channel_of_place.map(|channel| image.blacklevels[channel].into()),

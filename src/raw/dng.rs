@@ -9,7 +9,8 @@ use super::error::CONVERT_TO_DNG;
 use super::sensor::{self, Area, Stored};
 use super::tags::{Directory, Tiff, tag};
 use super::unpack::Storage;
-use super::{DecodeError, Hint, Layout, metadata};
+use super::{DecodeError, Hint, Layout, Samples, float, kind, metadata};
+use weavelight_calibration::description::Cfa;
 
 /// What black levels may differ along rows or columns before that is refused, relative to the range: 0.02 % costs less
 /// than 0.04 degrees of normal.
@@ -21,19 +22,30 @@ pub(crate) fn decode(tiff: &Tiff, hint: &Hint) -> Result<Stored, DecodeError> {
     sensor::linear_only(hint, "a DNG")?;
     let directory =
         tiff.sensor().ok_or_else(|| DecodeError::damaged("it has no directory of sensor data"))?;
-    if !matches!(directory.integer(tag::SAMPLE_FORMAT), None | Some(1)) {
-        return Err(DecodeError::unsupported("a floating-point DNG", CONVERT_TO_DNG));
+    let is_float = match directory.integer(tag::SAMPLE_FORMAT) {
+        None | Some(1) => false,
+        Some(3) => true,
+        Some(_) => return Err(DecodeError::unsupported("a DNG of signed samples", CONVERT_TO_DNG)),
+    };
+    check_extras(directory)?;
+    if let Some(how) = kind::compression(directory) {
+        return Err(DecodeError::unsupported(format!("a DNG with {how}"), CONVERT_TO_DNG));
     }
     if directory.integer(tag::PLANAR_CONFIGURATION).unwrap_or(1) != 1 {
         return Err(DecodeError::unsupported("a DNG of separate colour planes", CONVERT_TO_DNG));
     }
     let storage = Storage::parse(tiff, directory)?;
     let visible = active_area(directory, &storage)?;
-    let layout = layout(directory, &storage, hint)?;
-    let white = white_level(directory, storage.bits)?;
+    let layout = layout_with(directory, &storage, hint, cfa(directory)?)?;
+    let white = white_level(directory, storage.bits, is_float)?;
     let black = black_levels(directory, layout, white)?;
-    let mut samples = storage.unpack(tiff)?;
-    linearize(directory, &mut samples)?;
+    let samples = if is_float {
+        Samples::F32(float::unpack(&storage, tiff)?)
+    } else {
+        let mut samples = storage.unpack(tiff)?;
+        linearize(directory, &mut samples)?;
+        Samples::U16(samples)
+    };
     Ok(Stored {
         width: storage.width,
         height: storage.height,
@@ -46,7 +58,48 @@ pub(crate) fn decode(tiff: &Tiff, hint: &Hint) -> Result<Stored, DecodeError> {
     })
 }
 
-fn active_area(directory: &Directory, storage: &Storage) -> Result<Area, DecodeError> {
+/// Refuses what would change the samples' places or, beyond a factor each, their values. (Gains, lens corrections and lists of
+/// bad pixels are left aside: an instrument calibrates these itself.)
+fn check_extras(directory: &Directory) -> Result<(), DecodeError> {
+    let refuse =
+        |what: &str| Err(DecodeError::unsupported(format!("a DNG {what}"), CONVERT_TO_DNG));
+    for tag in [tag::ROW_INTERLEAVE, tag::COLUMN_INTERLEAVE, tag::SUB_TILE_BLOCK] {
+        if directory.integers(tag).is_some_and(|factors| factors.iter().any(|&factor| factor > 1)) {
+            return refuse("with interleaved rows or columns");
+        }
+    }
+    for tag in [tag::OPCODE_LIST_1, tag::OPCODE_LIST_2] {
+        let list = directory.bytes(tag).unwrap_or_default();
+        if let Some(name) = changing_opcode(list) {
+            return refuse(&format!("whose samples its opcode {name} still has to change"));
+        }
+    }
+    Ok(())
+}
+
+/// The first opcode of a list that must be applied and does more than multiply. DNG 1.7, chapter 7: big-endian, each with
+/// its number, version, flags (bit 0: may be left out) and length.
+fn changing_opcode(list: &[u8]) -> Option<&'static str> {
+    let (count, mut rest) = list.split_first_chunk::<4>()?;
+    for _ in 0..u32::from_be_bytes(*count) {
+        let (head, after) = rest.split_first_chunk::<16>()?;
+        let number = |at: usize| u32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let name = match number(0) {
+            7 => Some("MapTable"),
+            8 => Some("MapPolynomial"),
+            10 => Some("DeltaPerRow"),
+            11 => Some("DeltaPerColumn"),
+            _ => None,
+        };
+        if name.is_some() && number(8) & 1 == 0 {
+            return name;
+        }
+        rest = after.get(number(12) as usize..)?;
+    }
+    None
+}
+
+pub(crate) fn active_area(directory: &Directory, storage: &Storage) -> Result<Area, DecodeError> {
     let whole = || vec![0, 0, storage.height as u32, storage.width as u32];
     let area = directory.integers(tag::ACTIVE_AREA).unwrap_or_else(whole);
     let [top, left, bottom, right] = area[..] else {
@@ -56,7 +109,13 @@ fn active_area(directory: &Directory, storage: &Storage) -> Result<Area, DecodeE
     Ok(Area { top, left, bottom, right })
 }
 
-fn layout(directory: &Directory, storage: &Storage, hint: &Hint) -> Result<Layout, DecodeError> {
+/// What a pixel holds; `found` is the file's mosaic, where it says one.
+pub(crate) fn layout_with(
+    directory: &Directory,
+    storage: &Storage,
+    hint: &Hint,
+    found: Option<Cfa>,
+) -> Result<Layout, DecodeError> {
     let is_mosaic = directory.integer(tag::PHOTOMETRIC) == Some(32803);
     match (is_mosaic, storage.samples_per_pixel) {
         (true, 1) => {
@@ -66,31 +125,29 @@ fn layout(directory: &Directory, storage: &Storage, hint: &Hint) -> Result<Layou
                     sensor::CONVERT_TO_RGB,
                 ));
             }
-            sensor::mosaic(cfa(directory)?, hint)
+            sensor::mosaic(found, hint)
         }
         (false, 1) => sensor::no_mosaic(Layout::Grey, hint, "a monochrome picture"),
         (false, 3) => sensor::no_mosaic(Layout::Rgb, hint, "an RGB picture"),
         (_, n) => {
-            Err(DecodeError::unsupported(format!("a DNG of {n} samples per pixel"), CONVERT_TO_DNG))
+            Err(DecodeError::unsupported(format!("sensor data of {n} samples per pixel"), CONVERT_TO_DNG))
         }
     }
 }
 
 /// `None` where the directory names no filter at all.
-fn cfa(
-    directory: &Directory,
-) -> Result<Option<weavelight_calibration::description::Cfa>, DecodeError> {
+fn cfa(directory: &Directory) -> Result<Option<Cfa>, DecodeError> {
     let Some(codes) = directory.bytes(tag::CFA_PATTERN) else { return Ok(None) };
     let repeat = directory.integers(tag::CFA_REPEAT).unwrap_or_else(|| vec![2, 2]);
     sensor::cfa_from_codes(&repeat, codes).map(Some)
 }
 
 /// The lowest of the channels' white levels.
-fn white_level(directory: &Directory, bits: u32) -> Result<f64, DecodeError> {
-    let full = f64::from((1_u32 << bits.min(16)) - 1);
+fn white_level(directory: &Directory, bits: u32, is_float: bool) -> Result<f64, DecodeError> {
+    let full = if is_float { 1.0 } else { f64::from((1_u32 << bits.min(16)) - 1) };
     let levels = directory.numbers(tag::WHITE_LEVEL).unwrap_or_else(|| vec![full]);
     let lowest = levels.iter().copied().fold(f64::INFINITY, f64::min);
-    if lowest > 0.0 && lowest <= 65_535.0 {
+    if lowest > 0.0 && (lowest <= 65_535.0 || is_float && lowest.is_finite()) {
         Ok(lowest)
     } else {
         Err(DecodeError::damaged(format!("its white level is {lowest}")))
@@ -98,7 +155,7 @@ fn white_level(directory: &Directory, bits: u32) -> Result<f64, DecodeError> {
 }
 
 /// BlackLevel plus what BlackLevelDeltaH and BlackLevelDeltaV add on average to even and odd columns and rows.
-fn black_levels(
+pub(crate) fn black_levels(
     directory: &Directory,
     layout: Layout,
     white: f64,

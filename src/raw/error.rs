@@ -50,7 +50,8 @@ impl DecodeError {
 }
 
 /// What to do with a RAW file of an unusual kind.
-pub(crate) const CONVERT_TO_DNG: &str = "convert it to an uncompressed DNG";
+pub(crate) const CONVERT_TO_DNG: &str =
+    "convert it to DNG with Adobe DNG Converter or dnglab, without lossy compression";
 
 /// Why a frame's file gave no frame.
 #[derive(Debug, thiserror::Error)]

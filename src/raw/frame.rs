@@ -22,6 +22,27 @@ pub struct Frame {
     pub metadata: Metadata,
 }
 
+impl Frame {
+    /// Which levels were assumed, and what to do, as far as `stated` (black level, saturation) does not say them elsewhere; ends
+    /// where the place to say them follows. `None` where all are known.
+    pub fn assumed_levels(&self, stated: [bool; 2]) -> Option<String> {
+        let Assumed { black, saturation } = self.metadata.assumed;
+        let (black, saturation) = (black && !stated[0], saturation && !stated[1]);
+        let full = self.saturation[0];
+        Some(match (black, saturation) {
+            (false, false) => return None,
+            (true, false) => "states no black level, which is taken as 0; set black_level".to_owned(),
+            (false, true) => format!(
+                "does not state where it saturates, which is taken as {full}; set saturation_level"
+            ),
+            (true, true) => format!(
+                "states neither black level nor saturation, which are taken as 0 and {full}; set black_level and \
+                 saturation_level"
+            ),
+        })
+    }
+}
+
 /// What one pixel of a frame holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
@@ -61,6 +82,8 @@ pub struct Metadata {
     pub exposure_s: Option<f64>,
     /// Sensitivity.
     pub iso: Option<f64>,
+    /// The aperture: focal length over diameter.
+    pub f_number: Option<f64>,
     /// Focal length in millimetres.
     pub focal_length_mm: Option<f64>,
     /// The lens, as the camera names it.
@@ -71,6 +94,8 @@ pub struct Metadata {
     pub orientation: Option<u16>,
     /// What a picture file says of its numbers; of a RAW file nothing.
     pub numbers: Numbers,
+    /// Levels that the file does not state and that were assumed; no frame that comes from rawloader's table has any.
+    pub assumed: Assumed,
 }
 
 /// What a picture file says of its numbers.
@@ -88,4 +113,13 @@ pub struct Numbers {
     pub contradiction: Option<String>,
     /// Linear Rec. 709 from the picture's linear RGB, three rows that sum to 1, where the file says its primaries.
     pub linear_srgb_from_rgb: Option<[[f64; 3]; 3]>,
+}
+
+/// Levels that were assumed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Assumed {
+    /// Black as 0.
+    pub black: bool,
+    /// Saturation as the largest number of so many bits.
+    pub saturation: bool,
 }

@@ -11,7 +11,7 @@ const LONGEST_CODE: u32 = 16;
 ///
 /// # Errors
 /// Anything else than one scan of so many samples of up to 16 bits, neither subsampled nor restarted.
-pub(crate) fn decode(bytes: &[u8], counts: [usize; 2]) -> Result<Vec<u16>, DecodeError> {
+pub(crate) fn decode(bytes: &[u8], counts: [usize; 2]) -> Result<Jpeg, DecodeError> {
     let damaged = || DecodeError::damaged("a tile's lossless JPEG data does not unpack");
     let (header, scan) = Header::parse(bytes).ok_or_else(damaged)?;
     let found = header.columns * header.rows * header.components.len();
@@ -23,7 +23,19 @@ pub(crate) fn decode(bytes: &[u8], counts: [usize; 2]) -> Result<Vec<u16>, Decod
         )));
     }
     let scan = without_stuffing(scan);
-    header.decode(&scan).ok_or_else(damaged)
+    let samples = header.decode(&scan).ok_or_else(damaged)?;
+    let Header { rows, columns, .. } = header;
+    Ok(Jpeg { rows, columns, components: header.components.len(), samples })
+}
+
+/// A decoded lossless JPEG.
+#[derive(Debug)]
+pub(crate) struct Jpeg {
+    pub(crate) rows: usize,
+    pub(crate) columns: usize,
+    pub(crate) components: usize,
+    /// Row by row, components interleaved.
+    pub(crate) samples: Vec<u16>,
 }
 
 /// What the markers say.

@@ -9,8 +9,10 @@ mod ceiling;
 mod demosaic;
 mod dng;
 mod error;
+mod float;
 mod frame;
 mod hint;
+mod kind;
 mod ljpeg;
 mod metadata;
 mod nef;
@@ -19,6 +21,7 @@ mod picture;
 mod preview;
 mod read;
 mod sensor;
+mod tagged;
 mod tags;
 #[cfg(test)]
 mod tests;
@@ -27,7 +30,7 @@ mod unpack;
 pub use ceiling::{Ceiling, Histogram};
 pub use demosaic::demosaic;
 pub use error::{DecodeError, ReadError};
-pub use frame::{Frame, Layout, Metadata, Numbers, Samples};
+pub use frame::{Assumed, Frame, Layout, Metadata, Numbers, Samples};
 pub use hint::{Encoding, Hint};
 pub use picture::{contradictions, mixed_encodings};
 pub use preview::preview;
@@ -37,6 +40,9 @@ use crate::raster::{Format, PictureError, not_a_picture};
 use sensor::Stored;
 use tags::{Tiff, tag};
 
+/// What frames come in.
+const FRAMES: &str = "a RAW, DNG, TIFF, PNG, JPEG or OpenEXR file";
+
 /// Decodes a frame: RAW of any camera that rawloader knows, DNG, TIFF, PNG, JPEG or OpenEXR.
 ///
 /// NaN and infinities of floating-point pictures are kept; they are no measurements and count as unusable.
@@ -45,8 +51,11 @@ use tags::{Tiff, tag};
 /// Whatever the bytes are, an error says what is wrong with them and what to do; never panics.
 pub fn decode(bytes: &[u8], hint: &Hint) -> Result<Frame, DecodeError> {
     match Format::sniff(bytes) {
-        Some(format @ (Format::Png | Format::Jpeg | Format::Exr)) => {
+        Some(format @ (Format::Png | Format::Jpeg)) => {
             picture::decode(bytes, format, Metadata::default(), hint)
+        }
+        Some(Format::Exr) => {
+            picture::decode(bytes, Format::Exr, metadata::from_exr(bytes), hint)
         }
         Some(Format::Tiff) if !is_big_tiff(bytes) => decode_tiff(bytes, hint),
         Some(Format::Tiff) => picture::decode(bytes, Format::Tiff, Metadata::default(), hint),
@@ -58,7 +67,8 @@ pub fn decode(bytes: &[u8], hint: &Hint) -> Result<Frame, DecodeError> {
 pub fn metadata(bytes: &[u8]) -> Metadata {
     match Format::sniff(bytes) {
         Some(Format::Png | Format::Jpeg) => metadata::from_exif_container(bytes),
-        Some(Format::Exr) => Metadata::default(),
+        Some(Format::Exr) => metadata::from_exr(bytes),
+        None if bytes.starts_with(kind::RAF) => metadata::from_raf(bytes),
         _ => Tiff::parse(bytes)
             .map_or_else(|_| Metadata::default(), |tiff| metadata::from_tiff(&tiff)),
     }
@@ -73,7 +83,12 @@ pub fn decode_uncropped(
     hint: &Hint,
 ) -> Result<(usize, usize, Vec<u16>), DecodeError> {
     let stored = decode_stored(bytes, hint)?;
-    Ok((stored.width, stored.height, stored.samples))
+    match stored.samples {
+        Samples::U16(samples) => Ok((stored.width, stored.height, samples)),
+        Samples::F32(_) => {
+            Err(DecodeError::unsupported("floating-point sensor data", error::CONVERT_TO_DNG))
+        }
+    }
 }
 
 fn is_big_tiff(bytes: &[u8]) -> bool {
@@ -83,8 +98,7 @@ fn is_big_tiff(bytes: &[u8]) -> bool {
 /// A TIFF is a RAW file if it says DNG, has a directory of sensor data, or is Canon's kind; else a picture.
 fn decode_tiff(bytes: &[u8], hint: &Hint) -> Result<Frame, DecodeError> {
     let tiff = Tiff::parse(bytes)?;
-    let canon = bytes.get(8..10) == Some(b"CR");
-    if canon || tiff.with(tag::DNG_VERSION).is_some() || tiff.sensor().is_some() {
+    if tiff.with(tag::DNG_VERSION).is_some() || kind::is_container(bytes, &tiff) {
         decode_stored(bytes, hint)?.into_frame()
     } else {
         picture::decode(bytes, Format::Tiff, metadata::from_tiff(&tiff), hint)
@@ -105,13 +119,22 @@ fn decode_stored(bytes: &[u8], hint: &Hint) -> Result<Stored, DecodeError> {
         if directory.integer(tag::COMPRESSION) == Some(nef::NIKON) {
             return nef::decode(&tiff, directory, hint);
         }
+        return camera::decode(bytes, Some(&tiff), hint).or_else(|error| match error {
+            DecodeError::Picture(PictureError::Unsupported { .. } | PictureError::NotAPicture { .. }) => {
+                tagged::decode(&tiff, directory, hint)
+            }
+            error => Err(error),
+        });
     }
     camera::decode(bytes, Some(&tiff), hint)
 }
 
 /// RAW formats that are not built like TIFF. Those without a signature rawloader knows by their length.
 fn decode_other(bytes: &[u8], hint: &Hint) -> Result<Stored, DecodeError> {
-    match not_a_picture(bytes, "a RAW, DNG, TIFF, PNG, JPEG or OpenEXR file") {
+    if kind::is_compressed_raf(bytes) {
+        return Err(kind::refused(bytes, None, Some("with compression")));
+    }
+    match not_a_picture(bytes, FRAMES) {
         PictureError::NotAPicture { found: "a file of unknown kind", .. } => {
             camera::decode(bytes, None, hint)
         }

@@ -11,15 +11,17 @@ use super::nikon_bits::Tree;
 use super::sensor::{self, Area, Stored};
 use super::tags::{Block, Directory, Tiff, tag};
 use super::unpack::Storage;
-use super::{DecodeError, Hint, camera, metadata};
+use super::{Assumed, DecodeError, Hint, Metadata, Samples, camera, metadata};
 use crate::raster::PictureError;
 
 /// TIFF compression of Nikon's own.
 pub(crate) const NIKON: u32 = 34713;
 
-/// Maker-note tags.
+/// Maker-note tag of four black levels.
+pub(crate) const BLACK_LEVEL: u16 = 0x003d;
+
+/// Other maker-note tags.
 mod note {
-    pub(super) const BLACK_LEVEL: u16 = 0x003d;
     pub(super) const COMPRESSION: u16 = 0x0093;
     pub(super) const LINEARIZATION: u16 = 0x0096;
 }
@@ -47,15 +49,15 @@ pub(crate) fn decode(
         maker_note(tiff).ok_or_else(|| DecodeError::damaged("it has no Nikon maker note"))?;
     let kind = note.integer(note::COMPRESSION);
     if let Some((_, name)) = OTHER_KINDS.iter().find(|(number, _)| Some(*number) == kind) {
-        return Err(DecodeError::unsupported(*name, "set the camera to lossless compressed RAW"));
+        return Err(DecodeError::unsupported(*name, "set the camera to lossless compressed RAW, or convert it to DNG with Adobe DNG Converter"));
     }
     let coding = Coding::parse(&note, storage.bits)?;
     let mut stored = describe(tiff, directory, &note, &storage, hint)?;
-    stored.samples = decompress(tiff, directory, &storage, &coding)?;
+    stored.samples = Samples::U16(decompress(tiff, directory, &storage, &coding)?);
     Ok(stored)
 }
 
-fn maker_note<'a>(tiff: &Tiff<'a>) -> Option<Directory<'a>> {
+pub(crate) fn maker_note<'a>(tiff: &Tiff<'a>) -> Option<Directory<'a>> {
     let bytes = tiff.with(tag::MAKER_NOTE)?.bytes(tag::MAKER_NOTE)?;
     let inner = bytes.strip_prefix(b"Nikon\0")?.get(4..)?;
     let block = Block::new(inner)?;
@@ -147,7 +149,7 @@ fn describe(
     storage: &Storage,
     hint: &Hint,
 ) -> Result<Stored, DecodeError> {
-    let stored = match camera::load(tiff.block.bytes, camera::Want::Description) {
+    let stored = match camera::load(tiff.block.bytes, Some(tiff), camera::Want::Description) {
         Ok(image) => camera::describe(&image, Some(tiff), hint)?,
         Err(_) => describe_from_tags(tiff, directory, note, storage, hint)?,
     };
@@ -172,19 +174,20 @@ fn describe_from_tags(
         .bytes(tag::CFA_PATTERN)
         .map(|codes| sensor::cfa_from_codes(&repeat, codes))
         .transpose()?;
-    let black = match note.integers(note::BLACK_LEVEL).as_deref() {
-        Some(&[a, b, c, d]) => [a, b, c, d].map(|level| level as f32),
-        _ => [0.0; 4],
+    let black = match note.integers(BLACK_LEVEL).as_deref() {
+        Some(&[a, b, c, d]) => Some([a, b, c, d].map(|level| level as f32)),
+        _ => None,
     };
+    let assumed = Assumed { black: black.is_none(), saturation: true };
     Ok(Stored {
         width: storage.width,
         height: storage.height,
-        samples: Vec::new(),
+        samples: Samples::U16(Vec::new()),
         visible: Area { top: 0, left: 0, bottom: storage.height, right: storage.width },
         layout: sensor::mosaic(found, hint)?,
-        black,
+        black: black.unwrap_or_default(),
         saturation: [((1_u32 << storage.bits) - 1) as f32; 4],
-        metadata: metadata::from_tiff(tiff),
+        metadata: Metadata { assumed, ..metadata::from_tiff(tiff) },
     })
 }
 

@@ -1,6 +1,7 @@
 //! What turns stored sensor data into a frame: visible area, mosaic phase, levels.
 
 use super::{DecodeError, Frame, Hint, Layout, Metadata, Samples};
+use std::ops::Range;
 use weavelight_calibration::description::{Cfa, Channel};
 
 /// A rectangle of photosites; right and bottom are outside.
@@ -18,7 +19,7 @@ pub(crate) struct Stored {
     pub(crate) width: usize,
     pub(crate) height: usize,
     /// Row by row, channels interleaved.
-    pub(crate) samples: Vec<u16>,
+    pub(crate) samples: Samples,
     pub(crate) visible: Area,
     /// Phase and levels from the visible area's top left.
     pub(crate) layout: Layout,
@@ -49,25 +50,36 @@ impl Stored {
         }
         let whole = right - left == self.width && bottom - top == self.height;
         let channels = self.layout.channels();
-        let samples = if whole {
-            self.samples
-        } else {
-            let mut kept = Vec::with_capacity((right - left) * (bottom - top) * channels);
-            for row in self.samples.chunks_exact(self.width * channels).take(bottom).skip(top) {
-                kept.extend_from_slice(&row[left * channels..right * channels]);
-            }
-            kept
+        let (stride, rows, columns) =
+            (self.width * channels, top..bottom, left * channels..right * channels);
+        let samples = match self.samples {
+            samples if whole => samples,
+            Samples::U16(samples) => Samples::U16(cropped(&samples, stride, rows, columns)),
+            Samples::F32(samples) => Samples::F32(cropped(&samples, stride, rows, columns)),
         };
         Ok(Frame {
             width: right - left,
             height: bottom - top,
             layout: self.layout,
-            samples: Samples::U16(samples),
+            samples,
             black: self.black,
             saturation: self.saturation,
             metadata: self.metadata,
         })
     }
+}
+
+fn cropped<T: Copy>(
+    samples: &[T],
+    stride: usize,
+    rows: Range<usize>,
+    columns: Range<usize>,
+) -> Vec<T> {
+    let mut kept = Vec::with_capacity(rows.len() * columns.len());
+    for row in samples.chunks_exact(stride).take(rows.end).skip(rows.start) {
+        kept.extend_from_slice(&row[columns.clone()]);
+    }
+    kept
 }
 
 /// The colour-filter array of TIFF/EP codes (0 red, 1 green, 2 blue), row-major.
@@ -105,7 +117,7 @@ pub(crate) fn mosaic(found: Option<Cfa>, hint: &Hint) -> Result<Layout, DecodeEr
         (Some(cfa), _) | (None, Some(cfa)) => Ok(Layout::Mosaic(cfa)),
         (None, None) => Err(DecodeError::unsupported(
             "a mosaic of unknown colours",
-            "declare cfa = \"RGGB\" or as the camera has it",
+            "declare cfa = \"RGGB\" (import: --cfa RGGB), or as the camera has it",
         )),
     }
 }

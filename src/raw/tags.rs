@@ -14,6 +14,7 @@ pub(crate) mod tag {
     pub(crate) const BITS_PER_SAMPLE: u16 = 0x0102;
     pub(crate) const COMPRESSION: u16 = 0x0103;
     pub(crate) const PHOTOMETRIC: u16 = 0x0106;
+    pub(crate) const FILL_ORDER: u16 = 0x010a;
     pub(crate) const MAKE: u16 = 0x010f;
     pub(crate) const MODEL: u16 = 0x0110;
     pub(crate) const STRIP_OFFSETS: u16 = 0x0111;
@@ -32,9 +33,12 @@ pub(crate) mod tag {
     pub(crate) const CFA_REPEAT: u16 = 0x828d;
     pub(crate) const CFA_PATTERN: u16 = 0x828e;
     pub(crate) const EXPOSURE_TIME: u16 = 0x829a;
+    pub(crate) const F_NUMBER: u16 = 0x829d;
     pub(crate) const EXIF_IFD: u16 = 0x8769;
     pub(crate) const ISO: u16 = 0x8827;
     pub(crate) const RECOMMENDED_EXPOSURE_INDEX: u16 = 0x8832;
+    pub(crate) const SHUTTER_SPEED: u16 = 0x9201;
+    pub(crate) const APERTURE: u16 = 0x9202;
     pub(crate) const FOCAL_LENGTH: u16 = 0x920a;
     pub(crate) const MAKER_NOTE: u16 = 0x927c;
     pub(crate) const LENS_MODEL: u16 = 0xa434;
@@ -50,6 +54,11 @@ pub(crate) mod tag {
     pub(crate) const COLOR_MATRIX_2: u16 = 0xc622;
     pub(crate) const ILLUMINANT_1: u16 = 0xc65a;
     pub(crate) const ACTIVE_AREA: u16 = 0xc68d;
+    pub(crate) const ROW_INTERLEAVE: u16 = 0xc71f;
+    pub(crate) const SUB_TILE_BLOCK: u16 = 0xc71e;
+    pub(crate) const OPCODE_LIST_1: u16 = 0xc740;
+    pub(crate) const OPCODE_LIST_2: u16 = 0xc741;
+    pub(crate) const COLUMN_INTERLEAVE: u16 = 0xcd43;
 }
 
 /// Directories beyond this number are a loop or an attack; cameras write about ten.
@@ -177,6 +186,18 @@ impl<'a> Directory<'a> {
 
     fn entry(&self, tag: u16) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.tag == tag)
+    }
+
+    /// Bytes of the file that the directory speaks of: its values, and the strips, tiles or JPEG it places.
+    pub(crate) fn bytes_described(&self) -> usize {
+        const JPEG_LENGTH: u16 = 0x0202;
+        let values = self.entries.iter().filter_map(|e| size_of_kind(e.kind)?.checked_mul(e.count));
+        let placed = [tag::STRIP_BYTE_COUNTS, tag::TILE_BYTE_COUNTS, JPEG_LENGTH]
+            .into_iter()
+            .filter_map(|tag| self.integers(tag))
+            .flatten()
+            .map(|length| length as usize);
+        values.chain(placed).fold(0, usize::saturating_add)
     }
 
     pub(crate) fn has(&self, tag: u16) -> bool {

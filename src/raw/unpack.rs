@@ -8,6 +8,19 @@ use crate::raster::limits;
 use std::borrow::Cow;
 use std::io::Read;
 
+/// How samples of other than 8 or 16 bits stand in their bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Packing {
+    /// TIFF's: the most significant bit first.
+    MostFirst,
+    /// The least significant bit first.
+    LeastFirst,
+    /// TIFF's FillOrder 2: as the first, with the bits of each byte reversed.
+    Reversed,
+    /// Not packed: each sample in two bytes of the file's order.
+    Words,
+}
+
 /// How a directory stores its samples.
 #[derive(Clone, Debug)]
 pub(crate) struct Storage {
@@ -20,6 +33,9 @@ pub(crate) struct Storage {
     pub(crate) bits: u32,
     pub(crate) compression: u32,
     pub(crate) predictor: u32,
+    pub(crate) packing: Packing,
+    /// Whether lossless JPEG of four components holds blocks of 2 x 2 samples, as Sony's does.
+    pub(crate) blocks_of_four: bool,
     /// Size of a strip (as wide as the picture) or a tile, pixels.
     segment: [usize; 2],
     /// Offset and length of each strip or tile, bytes.
@@ -58,7 +74,18 @@ impl Storage {
         let (width, height) = (width as usize, height as usize);
         let (segment, places) = segments(directory, width, height)?;
         let predictor = directory.integer(tag::PREDICTOR).unwrap_or(1);
+        let stored_pixels = match directory.has(tag::TILE_OFFSETS) {
+            true => width.div_ceil(segment[0]) * height.div_ceil(segment[1]) * segment[0] * segment[1],
+            false => width * height,
+        };
+        let stored = places.iter().fold(0, |sum: usize, place| sum.saturating_add(place[1]));
+        // Fewer bits than 16, but two bytes for each sample: not packed at all.
+        let words = (9..16).contains(&bits[0])
+            && compression == 1
+            && stored >= stored_pixels.saturating_mul(2 * samples_per_pixel);
         Ok(Self {
+            packing: if words { Packing::Words } else { Packing::MostFirst },
+            blocks_of_four: false,
             width,
             height,
             samples_per_pixel,
@@ -85,18 +112,81 @@ impl Storage {
             )));
         }
         let plain = self.compression == 1
-            && self.bits == 16
+            && self.stored_bits() == 16
             && across == 1
             && self.segment[0] == self.width;
         if plain && tiff.block.order == Order::Little {
             return self.unpack_plain(tiff);
         }
         let mut samples = vec![0; self.width * self.height * self.samples_per_pixel];
-        let mut row = vec![0; self.segment[0] * self.samples_per_pixel];
-        for (i, &place) in self.places[..needed].iter().enumerate() {
-            self.unpack_segment(tiff, place, [i % across, i / across], &mut samples, &mut row)?;
+        if self.compression == 7 {
+            for (i, &place) in self.places[..needed].iter().enumerate() {
+                self.unpack_jpeg(tiff, place, [i % across, i / across], &mut samples)?;
+            }
+            return Ok(samples);
         }
+        self.each_row(tiff, &mut samples, |packed, row| {
+            self.unpack_row(packed, tiff.block.order, row);
+            if self.predictor == 2 {
+                undo_differences(row, self.samples_per_pixel, self.bits);
+            }
+        })?;
         Ok(samples)
+    }
+
+    /// The same, packed in another way.
+    pub(crate) fn with_packing(self, packing: Packing) -> Self {
+        Self { packing, ..self }
+    }
+
+    /// Bits that a sample takes up.
+    fn stored_bits(&self) -> u32 {
+        if self.packing == Packing::Words { 16 } else { self.bits }
+    }
+
+    /// Calls `unpack` with the bytes of every row of every strip or tile and a row of samples to fill, of which the part that
+    /// lies in the picture is kept.
+    ///
+    /// # Errors
+    /// Too few strips or tiles, or too few bytes in one.
+    pub(crate) fn each_row<T: Copy + Default>(
+        &self,
+        tiff: &Tiff,
+        samples: &mut [T],
+        unpack: impl Fn(&[u8], &mut [T]),
+    ) -> Result<(), DecodeError> {
+        let across = self.width.div_ceil(self.segment[0]);
+        let needed = across * self.height.div_ceil(self.segment[1]);
+        let places = self.places.get(..needed).ok_or_else(|| {
+            DecodeError::damaged(format!("it has {} of {needed} strips or tiles", self.places.len()))
+        })?;
+        let mut row = vec![T::default(); self.segment[0] * self.samples_per_pixel];
+        let row_bytes = (row.len() * self.stored_bits() as usize).div_ceil(8);
+        for (i, &place) in places.iter().enumerate() {
+            let within = self.part([i % across, i / across]);
+            let length = within.rows * row_bytes;
+            let bytes = match self.compression {
+                1 => Cow::Borrowed(self.bytes_of(tiff, place, length)?),
+                _ => Cow::Owned(inflate(self.bytes_of(tiff, place, place[1])?, length)?),
+            };
+            for (y, packed) in bytes.chunks_exact(row_bytes).enumerate() {
+                unpack(packed, &mut row);
+                within.keep(y, &row, samples);
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a strip or tile stands in the picture.
+    fn part(&self, [column, line]: [usize; 2]) -> Part {
+        let stride = self.width * self.samples_per_pixel;
+        let row = self.segment[0] * self.samples_per_pixel;
+        Part {
+            rows: self.segment[1].min(self.height - line * self.segment[1]),
+            start: line * self.segment[1] * stride + column * row,
+            kept: row.min(stride - column * row),
+            stride,
+        }
     }
 
     fn check_kind(&self) -> Result<(), DecodeError> {
@@ -140,41 +230,72 @@ impl Storage {
         bytes.ok_or_else(|| DecodeError::damaged(format!("a strip has {length} of {needed} bytes")))
     }
 
-    fn unpack_segment(
+    fn unpack_jpeg(
         &self,
         tiff: &Tiff,
         place: [usize; 2],
-        [column, line]: [usize; 2],
+        at: [usize; 2],
         samples: &mut [u16],
-        row: &mut [u16],
     ) -> Result<(), DecodeError> {
-        let rows = self.segment[1].min(self.height - line * self.segment[1]);
-        let stride = self.width * self.samples_per_pixel;
-        let first = column * row.len();
-        let kept = row.len().min(stride - first);
-        let start = |y: usize| (line * self.segment[1] + y) * stride + first;
-        if self.compression == 7 {
-            let counts = [row.len() * self.segment[1], row.len() * rows];
-            let values = ljpeg::decode(self.bytes_of(tiff, place, place[1])?, counts)?;
-            for (y, values) in values.chunks_exact(row.len()).take(rows).enumerate() {
-                samples[start(y)..start(y) + kept].copy_from_slice(&values[..kept]);
-            }
-            return Ok(());
-        }
-        let row_bytes = (row.len() * self.bits as usize).div_ceil(8);
-        let bytes = match self.compression {
-            1 => Cow::Borrowed(self.bytes_of(tiff, place, rows * row_bytes)?),
-            _ => Cow::Owned(inflate(self.bytes_of(tiff, place, place[1])?, rows * row_bytes)?),
-        };
-        for (y, packed) in bytes.chunks_exact(row_bytes).enumerate() {
-            unpack_row(packed, self.bits, tiff.block.order, row);
-            if self.predictor == 2 {
-                undo_differences(row, self.samples_per_pixel, self.bits);
-            }
-            samples[start(y)..start(y) + kept].copy_from_slice(&row[..kept]);
+        let within = self.part(at);
+        let row = self.segment[0] * self.samples_per_pixel;
+        let counts = [row * self.segment[1], row * within.rows];
+        let jpeg = ljpeg::decode(self.bytes_of(tiff, place, place[1])?, counts)?;
+        let blocks = self.blocks_of_four
+            && jpeg.components == 4
+            && 2 * jpeg.columns == row
+            && 2 * jpeg.rows >= within.rows;
+        let values = if blocks { from_blocks(&jpeg.samples, row) } else { jpeg.samples };
+        for (y, values) in values.chunks_exact(row).take(within.rows).enumerate() {
+            within.keep(y, values, samples);
         }
         Ok(())
     }
+
+    /// Samples of one row. TIFF 6.0: most significant bit first, except whole bytes in the file's order.
+    fn unpack_row(&self, packed: &[u8], order: Order, row: &mut [u16]) {
+        match (self.stored_bits(), self.packing) {
+            (8, _) => row.iter_mut().zip(packed).for_each(|(sample, &byte)| *sample = byte.into()),
+            (16, _) => row
+                .iter_mut()
+                .zip(packed.as_chunks().0)
+                .for_each(|(sample, &two)| *sample = order.u16(two)),
+            (bits, Packing::LeastFirst) => unpack_from_least(packed, bits, row),
+            (bits, Packing::Reversed) => {
+                unpack_bits(packed.iter().map(|byte| byte.reverse_bits()), bits, row);
+            }
+            (bits, _) => unpack_bits(packed.iter().copied(), bits, row),
+        }
+    }
+}
+
+/// A strip's or tile's place among the samples.
+struct Part {
+    /// Rows that lie in the picture.
+    rows: usize,
+    /// Index of its first sample.
+    start: usize,
+    /// Samples of a row that lie in the picture.
+    kept: usize,
+    stride: usize,
+}
+
+impl Part {
+    fn keep<T: Copy>(&self, y: usize, row: &[T], samples: &mut [T]) {
+        let start = self.start + y * self.stride;
+        samples[start..start + self.kept].copy_from_slice(&row[..self.kept]);
+    }
+}
+
+/// Rows of blocks of 2 x 2 samples, as rows of `width` samples.
+fn from_blocks(blocks: &[u16], width: usize) -> Vec<u16> {
+    let mut samples = Vec::with_capacity(blocks.len());
+    for row in blocks.chunks_exact(2 * width) {
+        for half in [0, 2] {
+            samples.extend(row.chunks_exact(4).flat_map(|four| [four[half], four[half + 1]]));
+        }
+    }
+    samples
 }
 
 /// Size of the strips or tiles and where each is.
@@ -218,24 +339,25 @@ fn segments(
     ))
 }
 
-/// Samples of one packed row. TIFF 6.0: most significant bit first, except whole bytes in the file's order.
-fn unpack_row(packed: &[u8], bits: u32, order: Order, row: &mut [u16]) {
-    match bits {
-        8 => row.iter_mut().zip(packed).for_each(|(sample, &byte)| *sample = byte.into()),
-        16 => row
-            .iter_mut()
-            .zip(packed.as_chunks().0)
-            .for_each(|(sample, &two)| *sample = order.u16(two)),
-        _ => unpack_bits(packed, bits, row),
-    }
-}
-
-fn unpack_bits(packed: &[u8], bits: u32, row: &mut [u16]) {
+fn unpack_from_least(packed: &[u8], bits: u32, row: &mut [u16]) {
     let mut bytes = packed.iter();
     let (mut buffer, mut held) = (0_u32, 0);
     for sample in row {
         while held < bits {
-            buffer = buffer << 8 | u32::from(bytes.next().copied().unwrap_or(0));
+            buffer |= u32::from(bytes.next().copied().unwrap_or(0)) << held;
+            held += 8;
+        }
+        *sample = (buffer & ((1 << bits) - 1)) as u16;
+        buffer >>= bits;
+        held -= bits;
+    }
+}
+
+fn unpack_bits(mut bytes: impl Iterator<Item = u8>, bits: u32, row: &mut [u16]) {
+    let (mut buffer, mut held) = (0_u32, 0);
+    for sample in row {
+        while held < bits {
+            buffer = buffer << 8 | u32::from(bytes.next().unwrap_or(0));
             held += 8;
         }
         held -= bits;

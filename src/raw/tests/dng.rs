@@ -7,8 +7,8 @@ use crate::raw::{DecodeError, Frame, Hint, Layout, Samples, decode, decode_uncro
 use std::io::Write;
 use weavelight_calibration::description::Cfa;
 
-const WIDTH: usize = 37;
-const HEIGHT: usize = 21;
+pub(super) const WIDTH: usize = 37;
+pub(super) const HEIGHT: usize = 21;
 
 /// How a test file stores its samples.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +25,7 @@ pub(super) const PLAIN: Kind =
     Kind { order: Order::Little, bits: 16, segment: [WIDTH, HEIGHT], compression: 1, predictor: 1 };
 
 /// Samples that use all bits and differ everywhere.
-fn samples(bits: u32) -> Vec<u16> {
+pub(super) fn samples(bits: u32) -> Vec<u16> {
     (0..WIDTH * HEIGHT).map(|i| ((i as u32 * 40_503 % 65_521) & ((1 << bits) - 1)) as u16).collect()
 }
 
@@ -246,11 +246,15 @@ fn check_refused(extra: Entries, expected: &str) {
 fn what_cannot_be_measured_with_is_refused() {
     let short = |value| Value::Short(vec![value]);
     let long = |values: &[u32]| Value::Long(values.to_vec());
-    check_refused(vec![(tag::COMPRESSION, short(34892))], "compression 34892");
+    check_refused(vec![(tag::COMPRESSION, short(34892))], "lossy JPEG");
+    check_refused(vec![(tag::SAMPLE_FORMAT, short(2))], "signed");
     check_refused(
-        vec![(tag::BITS_PER_SAMPLE, short(32)), (tag::SAMPLE_FORMAT, short(3))],
-        "floating-point",
+        vec![(tag::BITS_PER_SAMPLE, short(64)), (tag::SAMPLE_FORMAT, short(3))],
+        "a floating-point DNG of 64 bits",
     );
+    check_refused(vec![(tag::COMPRESSION, short(52_546))], "JPEG XL");
+    check_refused(vec![(tag::ROW_INTERLEAVE, short(2))], "interleaved");
+    check_refused(vec![(tag::OPCODE_LIST_2, Value::Undefined(opcode(8, 0)))], "MapPolynomial");
     check_refused(vec![(tag::BITS_PER_SAMPLE, short(32))], "32 bits");
     check_refused(vec![(tag::SAMPLES_PER_PIXEL, short(4))], "4 samples");
     check_refused(vec![(tag::CFA_REPEAT, Value::Short(vec![6, 6]))], "2 x 2");
@@ -275,6 +279,96 @@ fn what_cannot_be_measured_with_is_refused() {
     let ramp = (0..HEIGHT as u32).map(|y| [y * 10, 1]).collect();
     check_refused(vec![(tag::BLACK_LEVEL_DELTA_V, Value::Rational(ramp))], "varies along");
     check_refused(vec![(tag::LINEARIZATION_TABLE, long(&[70_000]))], "linearisation");
+}
+
+/// A list of a gain map and this opcode, with its flags.
+fn opcode(number: u32, flags: u32) -> Vec<u8> {
+    let gain_map = [9_u32, 0x0103_0000, 0, 4, 1234];
+    let words = [2].into_iter().chain(gain_map).chain([number, 0x0103_0000, flags, 0]);
+    words.flat_map(u32::to_be_bytes).collect()
+}
+
+#[test]
+fn opcodes_that_may_be_left_out_or_only_multiply_are_left_aside() {
+    for (number, flags) in [(8, 1), (9, 0), (12, 0), (4, 0)] {
+        let list = Value::Undefined(opcode(number, flags));
+        assert!(frame(PLAIN, vec![(tag::OPCODE_LIST_2, list)]).is_ok(), "opcode {number}");
+    }
+}
+
+/// Bytes of a number with so many bits of exponent and mantissa, by the book.
+fn short_float(value: f32, bits: u32) -> u32 {
+    let (exponent_bits, mantissa_bits) = match bits {
+        16 => (5, 10),
+        24 => (7, 16),
+        _ => return value.to_bits(),
+    };
+    let exponent = (value.to_bits() >> 23 & 0xff) as i32 - 127 + (1 << (exponent_bits - 1)) - 1;
+    let mantissa = value.to_bits() & 0x007f_ffff;
+    (exponent as u32) << mantissa_bits | mantissa >> (23 - mantissa_bits)
+}
+
+/// A floating-point DNG of values with few digits, all of which every kind holds.
+pub(super) fn float_file(bits: u32, compression: u16, predictor: u16, order: Order) -> (Vec<u8>, Vec<f32>) {
+    let values: Vec<f32> =
+        (0..WIDTH * HEIGHT).map(|i| (0.25 + (i * 37 % 512) as f32 / 512.0) * 0.5).collect();
+    let bytes = bits as usize / 8;
+    let row = |row: &[f32]| -> Vec<u8> {
+        let number = |value: &f32| short_float(*value, bits).to_be_bytes()[4 - bytes..].to_vec();
+        if predictor == 1 {
+            let in_order = |mut number: Vec<u8>| {
+                if order == Order::Little {
+                    number.reverse();
+                }
+                number
+            };
+            return row.iter().map(number).flat_map(in_order).collect();
+        }
+        let numbers: Vec<Vec<u8>> = row.iter().map(number).collect();
+        let mut plane: Vec<u8> =
+            (0..bytes).flat_map(|k| numbers.iter().map(move |number| number[k])).collect();
+        let distance = match predictor {
+            34_894 => 2,
+            34_895 => 4,
+            _ => 1,
+        };
+        (distance..plane.len()).rev().for_each(|i| plane[i] = plane[i].wrapping_sub(plane[i - distance]));
+        plane
+    };
+    let mut data: Vec<u8> = values.chunks(WIDTH).flat_map(row).collect();
+    if compression == 8 {
+        let mut deflate = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        deflate.write_all(&data).unwrap();
+        data = deflate.finish().unwrap();
+    }
+    let extra = vec![
+        (tag::BITS_PER_SAMPLE, Value::Short(vec![bits as u16])),
+        (tag::SAMPLE_FORMAT, Value::Short(vec![3])),
+        (tag::COMPRESSION, Value::Short(vec![compression])),
+        (tag::PREDICTOR, Value::Short(vec![predictor])),
+        (tag::STRIP_BYTE_COUNTS, Value::Long(vec![data.len() as u32])),
+        (tag::STRIP_OFFSETS, Value::Blobs(vec![data])),
+        (tag::BLACK_LEVEL, Value::Rational(vec![[1, 100]; 4])),
+    ];
+    let mut entries = entries(Kind { order, ..PLAIN }, extra);
+    entries.retain(|(tag, _)| *tag != tag::WHITE_LEVEL);
+    (tiff(order, &entries), values)
+}
+
+#[test]
+fn floating_point_samples_of_every_storage() {
+    for order in [Order::Little, Order::Big] {
+        for bits in [16, 24, 32] {
+            for (compression, predictor) in [(1, 1), (8, 1), (8, 3), (8, 34_894), (8, 34_895)] {
+                let (bytes, values) = float_file(bits, compression, predictor, order);
+                let frame = decode(&bytes, &Hint::default()).unwrap();
+                let Samples::F32(found) = &frame.samples else { panic!("integers") };
+                assert_eq!(found, &values, "{bits} bits, {compression}, {predictor}");
+                assert_eq!((frame.black, frame.saturation), ([0.01; 4], [1.0; 4]));
+                assert_eq!(frame.layout, Layout::Mosaic(Cfa::RGGB));
+            }
+        }
+    }
 }
 
 #[test]

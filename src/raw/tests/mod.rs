@@ -6,3 +6,4 @@ mod mutations;
 mod nef;
 mod pictures;
 mod reading;
+mod tagged;

@@ -2,7 +2,7 @@
 
 use super::builder::{Value, tiff};
 use super::nef::Random;
-use super::{dng, nef, pictures};
+use super::{dng, nef, pictures, tagged};
 use crate::raster::encode_exr;
 use crate::raw::tags::{Order, tag};
 use crate::raw::{Encoding, Frame, Hint, Samples, decode};
@@ -25,6 +25,16 @@ fn seeds() -> Vec<Vec<u8>> {
         dng::Kind { compression: 7, bits: 14, segment: [16, 16], ..plain },
         vec![],
     ));
+    for (bits, compression, predictor) in [(16, 8, 3), (24, 1, 1), (32, 8, 34_894)] {
+        seeds.push(dng::float_file(bits, compression, predictor, Order::Little).0);
+    }
+    let unknown = ("SONY", "ILCE-7M4");
+    for (bits, compression, segment) in
+        [(12, 1, [37, 5]), (14, 1, [16, 16]), (14, 7, [16, 16]), (16, 8, [37, 21])]
+    {
+        let kind = dng::Kind { bits, compression, segment, ..plain };
+        seeds.push(tagged::container(Order::Little, unknown, tagged::sensor(kind, vec![])));
+    }
     seeds.extend(nef::KINDS.iter().map(|&kind| nef::file(kind, 1).0));
     let grey = image::ImageBuffer::from_fn(33, 17, |x, y| image::Luma([(x * y * 100) as u16]));
     let rgb =
