@@ -1,9 +1,13 @@
 //! Lists of light directions and what stands beside them.
 
 use super::ImportError;
-use crate::files::{FileError, read_input_text};
+use super::lists::table::{self, Row, invalid};
+use super::lists::text;
+use super::names::last_part;
+use crate::files::FileError;
 use crate::quantity::{DIRECTION, INTENSITY};
 use nalgebra::{UnitVector3, Vector3};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// A list of directions, with names and intensities where there are any.
@@ -14,63 +18,141 @@ pub(super) struct LightList {
     pub(super) directions: Vec<UnitVector3<f64>>,
     /// R, G, B.
     pub(super) intensities: Vec<[f64; 3]>,
+    /// Whether these come from a file.
+    pub(super) has_intensities: bool,
     /// Which picture belongs to which direction.
     pub(super) named: Option<Named>,
+    /// Sentences for the user.
+    pub(super) warnings: Vec<String>,
 }
 
 /// Names of pictures, in the order of the directions.
 pub(super) struct Named {
     /// Where they stand.
     pub(super) list: PathBuf,
-    /// As written there.
-    pub(super) names: Vec<String>,
+    pub(super) names: Vec<Name>,
 }
 
-/// One line of a list: its number, a name if it has one, and its numbers.
-struct Line {
-    number: usize,
-    name: String,
-    values: Vec<f64>,
+/// The name of a picture in a list.
+#[derive(Clone, Debug)]
+pub(super) struct Name {
+    /// Its line, from 1.
+    pub(super) line: usize,
+    /// What it may be, likeliest first; never empty.
+    pub(super) candidates: Vec<String>,
+}
+
+impl Name {
+    /// As in the list.
+    pub(super) fn text(&self) -> &str {
+        &self.candidates[0]
+    }
 }
 
 impl LightList {
     pub(super) fn read(path: &Path) -> Result<Self, ImportError> {
-        let lines = read_lines(path, 3)?;
+        let table = table::read(path, &text::read(path)?, 3, None)?;
+        let rows = &table.rows;
         let directions =
-            lines.iter().map(|line| direction(path, line)).collect::<Result<Vec<_>, _>>()?;
-        let mut files = vec![path.to_owned()];
-        let named = match in_list(path, &lines)? {
-            Some(named) => Some(named),
-            None => beside(path, directions.len())?,
+            rows.iter().map(|row| direction(path, row)).collect::<Result<Vec<_>, _>>()?;
+        let mut list = Self {
+            files: vec![path.to_owned()],
+            intensities: vec![[1.0; 3]; directions.len()],
+            has_intensities: false,
+            named: in_list(path, rows)?,
+            warnings: Vec::new(),
+            directions,
         };
-        files.extend(named.iter().map(|named| named.list.clone()).filter(|list| list != path));
-        let intensities = read_intensities(path, directions.len(), &mut files)?;
-        Ok(Self { files, directions, intensities, named })
+        if table.has_more {
+            list.warnings.push(format!(
+                "{}: only the first three numbers after a name are used, as x y z",
+                path.display()
+            ));
+        }
+        if list.named.is_none() {
+            list.named = beside(path, list.directions.len())?;
+        }
+        let names = list.named.iter().map(|named| named.list.clone());
+        list.files.extend(names.filter(|list| list != path));
+        list.read_intensities(path)?;
+        Ok(list)
+    }
+
+    /// `light_intensities.txt` beside the list, one or three numbers a line; 1 where there is no such file.
+    fn read_intensities(&mut self, path: &Path) -> Result<(), ImportError> {
+        let list = path.with_file_name("light_intensities.txt");
+        if !list.is_file() || list == path {
+            return Ok(());
+        }
+        let count = self.directions.len();
+        let lines = text::read(&list)?;
+        let rows = match table::read(&list, &lines, 3, Some(count)) {
+            Ok(table) => table.rows,
+            Err(error) => {
+                table::read(&list, &lines, 1, Some(count)).map_err(|_| error)?.rows
+            }
+        };
+        let rows = self.in_order(rows);
+        if rows.len() != count {
+            let what = format!("light_intensities.txt beside it has {} lines", rows.len());
+            return Err(ImportError::Count { path: path.to_owned(), lights: count, what });
+        }
+        let intensities = rows.iter().map(|row| intensity(&list, row));
+        self.intensities = intensities.collect::<Result<_, _>>()?;
+        self.has_intensities = true;
+        self.files.push(list);
+        Ok(())
+    }
+
+    /// Rows that name their pictures, in the order of the list's names; others stay as they are.
+    fn in_order(&self, rows: Vec<Row>) -> Vec<Row> {
+        let Some(named) = &self.named else { return rows };
+        let mut by_name: HashMap<String, &Row> = HashMap::new();
+        for row in &rows {
+            for name in &row.names {
+                by_name.entry(last_part(name).to_lowercase()).or_insert(row);
+            }
+        }
+        let of = |name: &Name| {
+            let mut keys = name.candidates.iter().map(|text| last_part(text).to_lowercase());
+            keys.find_map(|key| by_name.get(&key).map(|row| (*row).clone()))
+        };
+        named.names.iter().map(of).collect::<Option<Vec<Row>>>().unwrap_or(rows)
     }
 }
 
-fn direction(path: &Path, line: &Line) -> Result<UnitVector3<f64>, FileError> {
-    if let Some(what) = line.values.iter().find_map(|value| DIRECTION.check(*value).err()) {
-        return Err(invalid(path, line.number, &format!("a number of this direction {what}")));
+fn direction(path: &Path, row: &Row) -> Result<UnitVector3<f64>, FileError> {
+    if let Some(what) = row.values.iter().find_map(|value| DIRECTION.check(*value).err()) {
+        return Err(invalid(path, row.number, &format!("a number of this direction {what}")));
     }
-    let vector = Vector3::from_column_slice(&line.values);
+    let vector = Vector3::from_column_slice(&row.values);
     UnitVector3::try_new(vector, 1e-9).ok_or_else(|| {
-        invalid(path, line.number, "this direction has no length; write x y z to the light")
+        invalid(path, row.number, "this direction has no length; write x y z to the light")
     })
 }
 
+fn intensity(list: &Path, row: &Row) -> Result<[f64; 3], FileError> {
+    if let Some(what) = row.values.iter().find_map(|value| INTENSITY.check(*value).err()) {
+        return Err(invalid(list, row.number, &format!("an intensity {what}")));
+    }
+    match row.values[..] {
+        [r, g, b] => Ok([r, g, b]),
+        _ => Ok([row.values[0]; 3]),
+    }
+}
+
 /// Names that stand in the list itself, as in `.lp` files: in every line or in none.
-fn in_list(path: &Path, lines: &[Line]) -> Result<Option<Named>, FileError> {
-    let unnamed = lines.iter().find(|line| line.name.is_empty());
+fn in_list(path: &Path, rows: &[Row]) -> Result<Option<Named>, FileError> {
+    let unnamed = rows.iter().find(|row| row.names.is_empty());
     match unnamed {
         None => {
-            let names = lines.iter().map(|line| line.name.clone()).collect();
-            Ok(Some(Named { list: path.to_owned(), names }))
+            let name = |row: &Row| Name { line: row.number, candidates: row.names.clone() };
+            Ok(Some(Named { list: path.to_owned(), names: rows.iter().map(name).collect() }))
         }
-        Some(_) if lines.iter().all(|line| line.name.is_empty()) => Ok(None),
-        Some(line) => Err(invalid(
+        Some(_) if rows.iter().all(|row| row.names.is_empty()) => Ok(None),
+        Some(row) => Err(invalid(
             path,
-            line.number,
+            row.number,
             "this line names no picture, but others do; name all or none",
         )),
     }
@@ -82,119 +164,14 @@ fn beside(path: &Path, count: usize) -> Result<Option<Named>, ImportError> {
     if !list.is_file() {
         return Ok(None);
     }
-    let names: Vec<String> =
-        meaningful_lines(&read_text(&list)?).map(|(_, line)| line.to_owned()).collect();
+    let names: Vec<Name> = table::read_names(&text::read(&list)?, count)
+        .into_iter()
+        .filter(|(_, candidates)| !candidates.is_empty())
+        .map(|(line, candidates)| Name { line, candidates })
+        .collect();
     if names.len() != count {
         let what = format!("filenames.txt beside it names {} pictures", names.len());
         return Err(ImportError::Count { path: path.to_owned(), lights: count, what });
     }
     Ok(Some(Named { list, names }))
-}
-
-/// `light_intensities.txt` beside the list, one or three numbers a line; 1 where there is no such file.
-fn read_intensities(
-    path: &Path,
-    count: usize,
-    files: &mut Vec<PathBuf>,
-) -> Result<Vec<[f64; 3]>, ImportError> {
-    let list = path.with_file_name("light_intensities.txt");
-    if !list.is_file() || list == path {
-        return Ok(vec![[1.0; 3]; count]);
-    }
-    let columns = if first_line_width(&read_text(&list)?) == 1 { 1 } else { 3 };
-    let lines = read_lines(&list, columns)?;
-    if lines.len() != count {
-        let what = format!("light_intensities.txt beside it has {} lines", lines.len());
-        return Err(ImportError::Count { path: path.to_owned(), lights: count, what });
-    }
-    let intensity = |line: &Line| {
-        if let Some(what) = line.values.iter().find_map(|value| INTENSITY.check(*value).err()) {
-            return Err(invalid(&list, line.number, &format!("an intensity {what}")));
-        }
-        match line.values[..] {
-            [r, g, b] => Ok([r, g, b]),
-            _ => Ok([line.values[0]; 3]),
-        }
-    };
-    let intensities = lines.iter().map(intensity).collect::<Result<_, _>>()?;
-    files.push(list);
-    Ok(intensities)
-}
-
-fn first_line_width(text: &str) -> usize {
-    meaningful_lines(text).nth(1).map_or(0, |(_, line)| words(line).count())
-}
-
-/// Lines of `columns` numbers, a name before them allowed; a first line that is one whole number is their count.
-fn read_lines(path: &Path, columns: usize) -> Result<Vec<Line>, FileError> {
-    let text = read_text(path)?;
-    let mut lines = meaningful_lines(&text).peekable();
-    let stated =
-        lines.peek().and_then(|(_, line)| line.parse::<usize>().ok()).filter(|_| columns > 1);
-    if stated.is_some() {
-        lines.next();
-    }
-    let found = lines
-        .map(|(number, line)| parse_line(path, number, line, columns))
-        .collect::<Result<Vec<_>, _>>()?;
-    match stated {
-        Some(stated) if stated != found.len() => {
-            let what = format!(
-                "states {stated} lines, but {} follow; correct the number or the list",
-                found.len()
-            );
-            Err(invalid(path, 1, &what))
-        }
-        _ => Ok(found),
-    }
-}
-
-fn parse_line(path: &Path, number: usize, line: &str, columns: usize) -> Result<Line, FileError> {
-    let wrong = || {
-        invalid(
-            path,
-            number,
-            &format!("\"{}\" is not {columns} finite numbers; correct this line", shortened(line)),
-        )
-    };
-    let words: Vec<&str> = words(line).collect();
-    if words.len() < columns {
-        return Err(wrong());
-    }
-    let (name, values) = words.split_at(words.len() - columns);
-    let number_of = |word: &&str| word.parse::<f64>().ok().filter(|value| value.is_finite());
-    let values = values.iter().map(number_of).collect::<Option<Vec<f64>>>().ok_or_else(wrong)?;
-    // A fourth number is no name: the list has more columns than we know.
-    if name.len() == 1
-        && columns == 3
-        && name[0].parse::<f64>().is_ok()
-        && !name[0].contains(char::is_alphabetic)
-    {
-        return Err(wrong());
-    }
-    Ok(Line { number, name: name.join(" "), values })
-}
-
-fn words(line: &str) -> impl Iterator<Item = &str> {
-    line.split(|letter: char| letter.is_whitespace() || letter == ',')
-        .filter(|word| !word.is_empty())
-}
-
-fn meaningful_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-    lines
-        .map(|(k, line)| (k + 1, line.trim()))
-        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-}
-
-fn read_text(path: &Path) -> Result<String, FileError> {
-    read_input_text(path).map_err(|source| FileError::read(path, source))
-}
-
-fn shortened(line: &str) -> String {
-    line.chars().filter(|letter| !letter.is_control()).take(60).collect()
-}
-
-fn invalid(path: &Path, line: usize, what: &str) -> FileError {
-    FileError::Invalid { path: path.to_owned(), line, what: what.to_owned() }
 }

@@ -1,7 +1,11 @@
 //! Picture sets from elsewhere as capture sessions: RTI `.lp` files, DiLiGenT folders, plain lists of directions. Axes: x
 //! right, y up, z to the viewer, which are the rig's own.
 
+mod exposures;
 mod lights;
+mod lists;
+mod looks;
+mod names;
 mod natural;
 mod numbers;
 mod pairs;
@@ -9,18 +13,17 @@ mod pictures;
 #[cfg(test)]
 mod tests;
 
-use self::lights::{LightList, Named};
+use self::exposures::{Exposure, Stated};
+use self::lights::LightList;
 use self::numbers::{Gathered, encoding_of};
 use self::pairs::Pair;
 use self::pictures::Frame;
 use super::{Encoding, FrameEntry, Kind, Session, SessionError};
-use crate::files::{
-    FileError, Input, OutputKind, Provenance, StagedFolder, sha256_hex, sha256_of_file,
-};
-use crate::instrument::{CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights};
+use crate::files::{FileError, Input, OutputKind, Provenance, StagedFolder, sha256_of_file};
+use crate::instrument::{COLOR_FILE, CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use weavelight_calibration::description::{DirectionalLight, Light};
+use weavelight_calibration::description::{Cfa, DirectionalLight, Light};
 
 /// The calibration's folder in an imported capture session.
 pub const CALIBRATION: &str = "calibration";
@@ -39,6 +42,10 @@ pub struct Options {
     pub out: PathBuf,
     /// How the pictures encode light; 8-bit pictures must say.
     pub encoding: Option<Encoding>,
+    /// The mosaic of pictures that are a colour sensor's samples and do not say so.
+    pub cfa: Option<Cfa>,
+    /// Whether all pictures count as equally exposed, whatever their files state: for sets that were normalised already.
+    pub same_exposure: bool,
     /// A picture that is not 0 where the object is.
     pub mask: Option<PathBuf>,
 }
@@ -52,6 +59,10 @@ pub struct Summary {
     pub calibration: PathBuf,
     /// Pictures, which is lights.
     pub frames: usize,
+    /// Lights of the list, of which the pictures may choose some.
+    pub lights_in_list: usize,
+    /// Exposure times and sensitivities, where the files state any.
+    pub exposures: Option<String>,
     /// Width and height.
     pub size_px: [usize; 2],
     /// Sentences for the user.
@@ -90,23 +101,79 @@ pub enum ImportError {
         /// What there is of the other.
         what: String,
     },
+    /// A RAW or floating-point picture that is said to be sRGB-encoded.
+    #[error("{}: {format} holds linear values; leave out --encoding srgb", .path.display())]
+    EncodingContradicted {
+        /// The picture.
+        path: PathBuf,
+        /// As in "a RAW file".
+        format: &'static str,
+    },
+    /// A picture that is no mosaic, or another than the one given.
+    #[error("{}: --cfa {declared} is given, but this file holds {found}; leave out --cfa, or correct it", .path.display())]
+    CfaContradicted {
+        /// The picture.
+        path: PathBuf,
+        /// As in "RGGB".
+        declared: String,
+        /// From the file.
+        found: String,
+    },
+    /// Exposures of which some are known and differ, and some are not.
+    #[error("{}: states no {what}, but the others state {low} to {high}; give pictures that all state it, or --same-exposure if all were equally exposed", .path.display())]
+    ExposureMixed {
+        /// The picture that is silent.
+        path: PathBuf,
+        /// What is not stated.
+        what: &'static str,
+        /// The least that others state.
+        low: String,
+        /// The most that others state.
+        high: String,
+    },
+    /// Pictures of several apertures.
+    #[error("{}: was taken at f/{found}, but {} at f/{expected}; take all pictures at one aperture, or give --same-exposure if they were normalised already", .path.display(), .first.display())]
+    Aperture {
+        /// The odd one.
+        path: PathBuf,
+        /// Its f-number.
+        found: f64,
+        /// The first one.
+        first: PathBuf,
+        /// Its f-number.
+        expected: f64,
+    },
+    /// A picture that the list names for two lights.
+    #[error("{}:{line}: names {name}, {place}", .path.display())]
+    NamedTwice {
+        /// The list.
+        path: PathBuf,
+        /// Line of the second.
+        line: usize,
+        /// The picture.
+        name: String,
+        /// Which was the first, and what to do.
+        place: String,
+    },
     /// A picture that the list names is not there.
-    #[error("{}: names {name}, which is not {place}; correct the list or give that picture", .path.display())]
+    #[error("{}:{line}: names {name}, which is not {place}; correct the list or give that picture", .path.display())]
     NamedMissing {
         /// The list.
         path: PathBuf,
+        /// Its line.
+        line: usize,
         /// The picture.
         name: String,
         /// Where it was looked for.
         place: String,
     },
     /// Too few or too many lights.
-    #[error("{}: {count} directions; a solve takes {} to {}", .path.display(), LIGHT_COUNT.start(), LIGHT_COUNT.end())]
+    #[error("{}: {what}; a solve takes {} to {}", .path.display(), LIGHT_COUNT.start(), LIGHT_COUNT.end())]
     LightCount {
         /// The list.
         path: PathBuf,
-        /// Directions in it.
-        count: usize,
+        /// How many there are.
+        what: String,
     },
     /// Pictures of different size.
     #[error("{}: is {} x {}, but {} is {} x {}; all pictures must be of one size", .path.display(), .size[0], .size[1], .first.display(), .expected[0], .expected[1])]
@@ -128,27 +195,44 @@ pub enum ImportError {
 /// Where lists or pictures cannot be read or do not pair, or the target cannot be written; then nothing is.
 pub fn run(options: &Options, progress: &dyn Fn(f64, &str)) -> Result<Summary, ImportError> {
     let list = LightList::read(&options.lights)?;
-    let count = list.directions.len();
-    if !LIGHT_COUNT.contains(&count) {
-        return Err(ImportError::LightCount { path: options.lights.clone(), count });
-    }
     let (pairs, mut warnings) = pairs::pair(&list, options)?;
-    warnings.extend(list.warnings());
+    warnings.splice(0..0, list.warnings.iter().cloned());
+    warnings.extend(list.lights_behind(&pairs));
     let staged = StagedFolder::create(&options.out, OUTPUT)?;
     let name = name_of(&options.lights, staged.target());
     let mut session = Session::new(staged.path(), Kind::Swatch, name);
     let mut names = Names::default();
     let mut first: Option<(PathBuf, [usize; 2])> = None;
     let mut gathered = Gathered::default();
+    let (mut looks, mut stated) = (Vec::new(), Vec::new());
     for (k, pair) in pairs.iter().enumerate() {
-        progress(k as f64 / count as f64, "copying pictures");
-        let picture = pictures::read_frame(&pair.image, options.encoding)?;
+        progress(k as f64 / pairs.len() as f64, "copying pictures");
+        let picture = pictures::read_frame(&pair.image, options)?;
         let (path, expected) = first.get_or_insert_with(|| (pair.image.clone(), picture.size_px));
         check_size(&pair.image, picture.size_px, path, *expected)?;
-        let encoding = options.encoding.or_else(|| encoding_of(&picture.numbers));
-        session.frames.push(add_frame(&staged, &mut names, pair, &picture, encoding)?);
-        gathered.add(&pair.image, &picture.numbers, picture.histogram);
+        let encoding = options.encoding.or_else(|| encoding_of(&picture.metadata.numbers));
+        let name = copy(&staged, &mut names, pair, &picture)?;
+        gathered.add(&pair.image, &picture.metadata.numbers, picture.histogram);
+        let mut frame = FrameEntry::new(name, Some(k), 1.0, 100.0);
+        frame.sha256 = Some(picture.sha256);
+        (frame.encoding, frame.cfa) = (encoding, options.cfa);
+        session.frames.push(frame);
+        if let Some(what) = picture.assumed.filter(|_| k == 0) {
+            warnings.push(format!(
+                "{}: {what} in {CALIBRATION}/{COLOR_FILE} of the capture session",
+                pair.image.display()
+            ));
+        }
+        stated.push(Stated::new(&pair.image, &picture.metadata));
+        looks.push(picture.look);
     }
+    let (exposures, of_exposures) = exposures::settle(&stated, list.has_intensities, options)?;
+    for (frame, Exposure { seconds, iso }) in session.frames.iter_mut().zip(&exposures) {
+        (frame.exposure_s, frame.iso) = (*seconds, *iso);
+    }
+    warnings.extend(of_exposures);
+    warnings.extend(looks::copies(&looks));
+    warnings.extend(looks::mosaic(&looks));
     let size_px = first.map_or([0, 0], |(_, size)| size);
     if let Some(mask) = &options.mask {
         let picture = pictures::read_mask(mask)?;
@@ -166,7 +250,9 @@ pub fn run(options: &Options, progress: &dyn Fn(f64, &str)) -> Result<Summary, I
     Ok(Summary {
         calibration: target.join(CALIBRATION),
         session: target,
-        frames: count,
+        frames: pairs.len(),
+        lights_in_list: list.directions.len(),
+        exposures: exposures::summary(&stated, &exposures),
         size_px,
         warnings,
     })
@@ -190,21 +276,18 @@ fn name_of(lights: &Path, target: &Path) -> String {
     folder.map_or_else(|| "imported".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
-fn add_frame(
+/// Copies a picture into the capture session; returns its name there.
+fn copy(
     staged: &StagedFolder,
     names: &mut Names,
     pair: &Pair,
     picture: &Frame,
-    encoding: Option<Encoding>,
-) -> Result<FrameEntry, ImportError> {
+) -> Result<String, FileError> {
     let file_name = pair.image.file_name().unwrap_or_default().to_string_lossy();
     let name = names.free(&file_name);
     let path = staged.join(&name);
     std::fs::write(&path, &picture.bytes).map_err(|source| FileError::write(&path, source))?;
-    let mut frame = FrameEntry::new(name, Some(pair.light), 1.0, 100.0);
-    frame.sha256 = Some(sha256_hex(&picture.bytes));
-    frame.encoding = encoding;
-    Ok(frame)
+    Ok(name)
 }
 
 /// Names already given in the folder: pictures from several folders may share one.
@@ -230,12 +313,11 @@ fn write_calibration(
     pairs: &[Pair],
     color: &Color,
 ) -> Result<(), ImportError> {
-    let light = |k: usize| {
-        let far =
-            DirectionalLight { direction: list.directions[k], intensity: list.intensities[k] };
-        CalibratedLight::new(Light::Directional(far))
+    let light = |&Pair { light, .. }: &Pair| {
+        let (direction, intensity) = (list.directions[light], list.intensities[light]);
+        CalibratedLight::new(Light::Directional(DirectionalLight { direction, intensity }))
     };
-    let lights: Vec<CalibratedLight> = (0..pairs.len()).map(light).collect();
+    let lights: Vec<CalibratedLight> = pairs.iter().map(light).collect();
     let mut inputs = Vec::new();
     for path in &list.files {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -248,14 +330,9 @@ fn write_calibration(
 }
 
 impl LightList {
-    fn warnings(&self) -> Option<String> {
-        let behind = self.directions.iter().filter(|direction| direction.z <= 0.0).count();
+    fn lights_behind(&self, pairs: &[Pair]) -> Option<String> {
+        let behind = pairs.iter().filter(|pair| self.directions[pair.light].z <= 0.0).count();
         let path = self.files[0].display();
         (behind > 0).then(|| format!("{path}: {behind} lights come from behind the picture (z <= 0); z points to the viewer"))
-    }
-
-    /// The names that the list gives to the pictures, if it does.
-    fn names(&self) -> Option<&Named> {
-        self.named.as_ref()
     }
 }

@@ -1,44 +1,59 @@
 //! The pictures themselves: what must be known of them to import them.
 
-use super::{Encoding, ImportError};
-use crate::files::FileError;
+use super::looks::Look;
+use super::{Encoding, ImportError, Options};
+use crate::files::{FileError, sha256_hex};
 use crate::raster;
-use crate::raw::{self, DecodeError, Hint, Histogram, Numbers};
+use crate::raw::{self, DecodeError, Hint, Histogram, Metadata};
 use image::{ColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::path::Path;
 
-/// A picture's file and its size.
+/// A picture's file and what must be known of it.
 pub(super) struct Frame {
     /// The file as it is.
     pub(super) bytes: Vec<u8>,
+    pub(super) sha256: String,
     /// Width and height.
     pub(super) size_px: [usize; 2],
-    /// What its file says of its numbers.
-    pub(super) numbers: Numbers,
+    pub(super) metadata: Metadata,
+    /// Levels that its file does not state, and what to do; ends where the place to state them follows.
+    pub(super) assumed: Option<String>,
+    pub(super) look: Look,
     /// How often each number occurs, where its file leaves it open where samples clip.
     pub(super) histogram: Option<Histogram>,
 }
 
 /// Reads a picture, and decodes it as a solve will: what cannot be solved is not imported.
-pub(super) fn read_frame(path: &Path, encoding: Option<Encoding>) -> Result<Frame, ImportError> {
+pub(super) fn read_frame(path: &Path, options: &Options) -> Result<Frame, ImportError> {
     let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
         .map_err(|source| FileError::read(path, source))?;
-    let encoding = encoding.map(|encoding| match encoding {
+    let encoding = options.encoding.map(|encoding| match encoding {
         Encoding::Linear => raw::Encoding::Linear,
         Encoding::Srgb => raw::Encoding::Srgb,
     });
-    let frame =
-        raw::decode(&bytes, &Hint { cfa: None, encoding }).map_err(|error| match error {
-            DecodeError::EncodingUndeclared => ImportError::EncodingUnknown(path.to_owned()),
-            DecodeError::EncodingUnreadable { by, why } => {
-                ImportError::EncodingUnreadable { path: path.to_owned(), by, why }
-            }
-            error => FileError::Content { path: path.to_owned(), what: error.to_string() }.into(),
-        })?;
+    let path = || path.to_owned();
+    let hint = Hint { cfa: options.cfa, encoding };
+    let frame = raw::decode(&bytes, &hint).map_err(|error| match error {
+        DecodeError::EncodingUndeclared => ImportError::EncodingUnknown(path()),
+        DecodeError::EncodingUnreadable { by, why } => {
+            ImportError::EncodingUnreadable { path: path(), by, why }
+        }
+        DecodeError::EncodingContradicted { format } => {
+            ImportError::EncodingContradicted { path: path(), format }
+        }
+        DecodeError::CfaContradicted { declared, found } => {
+            ImportError::CfaContradicted { path: path(), declared, found }
+        }
+        error => FileError::Content { path: path(), what: error.to_string() }.into(),
+    })?;
+    let sha256 = sha256_hex(&bytes);
     Ok(Frame {
+        look: Look::new(&path(), &sha256, &frame),
         size_px: [frame.width, frame.height],
+        assumed: frame.assumed_levels([false; 2]),
         histogram: Histogram::of_frame(&frame),
-        numbers: frame.metadata.numbers,
+        metadata: frame.metadata,
+        sha256,
         bytes,
     })
 }

@@ -1,3 +1,7 @@
+mod chosen;
+mod exposed;
+mod written;
+
 use super::*;
 use crate::instrument::Calibration;
 use crate::raster::{PngContent, write_png_grey16, write_png_rgb16};
@@ -34,6 +38,8 @@ impl Set {
             images: images.iter().map(|name| self.path(name)).collect(),
             out: self.path("out"),
             encoding: None,
+            cfa: None,
+            same_exposure: false,
             mask: None,
         }
     }
@@ -192,8 +198,8 @@ fn impossible_lists_are_told_with_line_and_remedy() {
         NONE,
         "l.txt: 4 directions, but 3 pictures were given",
     );
-    check("l.txt", "0 0 1\n0 1 1\n", NONE, "l.txt: 2 directions; a solve takes 3 to 64");
-    check("l.txt", &"0 0 1\n".repeat(65), NONE, "l.txt: 65 directions; a solve takes 3 to 64");
+    check("l.txt", "0 0 1\n0 1 1\n", NONE, "l.txt: 2 directions; a solve takes 3 to 256");
+    check("l.txt", &"0 0 1\n".repeat(257), NONE, "l.txt: 257 directions; a solve takes 3 to 256");
     check("l.txt", "0 0 1\n0 0 0\n0 1 1\n", NONE, "l.txt:2: this direction has no length");
     check("l.txt", "0 0 1\n0 nan 1\n0 1 1\n", NONE, "l.txt:2: \"0 nan 1\" is not 3 finite numbers");
     check("l.txt", "0 0 1\n0 1\n0 1 1\n", NONE, "l.txt:2: \"0 1\" is not 3 finite numbers");
@@ -209,13 +215,13 @@ fn impossible_lists_are_told_with_line_and_remedy() {
         "l.lp",
         "a.png 0 0 1\nx.png 0 1 1\nc.png 1 0 1\n",
         NONE,
-        "l.lp: names x.png, which is not among",
+        "l.lp:2: names x.png, which is not among",
     );
     check(
         "l.lp",
         "a.png 0 0 1\na.png 0 1 1\nc.png 1 0 1\n",
         NONE,
-        "l.lp: names a.png, which is not among",
+        "l.lp:2: names a.png, the picture of line 1 already",
     );
     check(
         "l.txt",
