@@ -83,7 +83,9 @@ pub(crate) const SEARCH_SAMPLES: usize = 5;
 pub(crate) fn chi_square_limit(freedom: usize) -> f64 {
     match freedom {
         0 => f64::INFINITY,
-        _ => CHI_SQUARE_999.get(freedom - 1).copied().unwrap_or_else(|| chi_square_of_many(freedom)),
+        _ => {
+            CHI_SQUARE_999.get(freedom - 1).copied().unwrap_or_else(|| chi_square_of_many(freedom))
+        }
     }
 }
 
@@ -95,9 +97,7 @@ fn chi_square_of_many(freedom: usize) -> f64 {
     let k = freedom as f64;
     let root = (2.0 * k).sqrt();
     let [z2, z3, z4, z5] = [Z.powi(2), Z.powi(3), Z.powi(4), Z.powi(5)];
-    k + Z * root
-        + 2.0 / 3.0 * (z2 - 1.0)
-        + (z3 - 7.0 * Z) / (9.0 * root)
+    k + Z * root + 2.0 / 3.0 * (z2 - 1.0) + (z3 - 7.0 * Z) / (9.0 * root)
         - (6.0 * z4 + 14.0 * z2 - 32.0) / (405.0 * k)
         + (9.0 * z5 + 256.0 * z3 - 433.0 * Z) / (4860.0 * root * k)
 }
@@ -123,7 +123,9 @@ mod tests {
     fn limits_beyond_the_table_are_those_of_the_distribution() {
         assert!((chi_square_of_many(61) - 100.8879).abs() < 1e-3);
         assert!((chi_square_of_many(20) - 45.3147).abs() < 5e-3);
-        for (freedom, expected) in [(62, 102.1662), (93, 140.8931), (128, 183.1864), (253, 328.2456)] {
+        for (freedom, expected) in
+            [(62, 102.1662), (93, 140.8931), (128, 183.1864), (253, 328.2456)]
+        {
             let found = chi_square_limit(freedom);
             assert!((found - expected).abs() < 1e-3, "{freedom}: {found}, not {expected}");
         }

@@ -38,9 +38,9 @@ mod wide;
 pub(crate) mod tests;
 
 pub use elsewhere::{CutPiece, CutRow, Found};
+pub use light_set::LightSet;
 #[cfg(feature = "gpu")]
 pub(crate) use method::chi_square_limit;
-pub use light_set::LightSet;
 pub use method::{MAX_LIGHTS, Method};
 pub use noise::estimate_noise;
 pub use normalise::{Normalisation, normalise_row};

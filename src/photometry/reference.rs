@@ -139,7 +139,13 @@ impl Samples<'_> {
             }
         }
         let inverse = inverse_if_conditioned(&normal_matrix)?;
-        Some(Solution { g: inverse * right, inverse, weights, clear: None, dropped: LightSet::NONE })
+        Some(Solution {
+            g: inverse * right,
+            inverse,
+            weights,
+            clear: None,
+            dropped: LightSet::NONE,
+        })
     }
 
     /// Weighted solution; `plain` is the solution with every usable sample. Where all samples are there, noise explains the

@@ -102,8 +102,7 @@ fn judge(block: &Block, dropped: &[LightSet; LANES], solved: &mut Weighted) {
     for k in 0..block.len {
         solved.surface.dropped[k] = dropped[k];
         let (mut dark, mut bright) = (false, false);
-        for (_, sample) in
-            block.sample.iter().enumerate().filter(|&(i, _)| dropped[k].contains(i))
+        for (_, sample) in block.sample.iter().enumerate().filter(|&(i, _)| dropped[k].contains(i))
         {
             let above = sample.y[k] > solved.surface.predicted(sample, k);
             bright |= above;

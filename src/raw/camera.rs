@@ -67,7 +67,8 @@ pub(crate) fn load(bytes: &[u8], tiff: Option<&Tiff>, want: Want) -> Result<RawI
 /// rawloader's own words are for its developers, run over several lines and name its issue tracker.
 fn refused(bytes: &[u8], tiff: Option<&Tiff>, text: &str) -> DecodeError {
     if text.contains("Couldn't find a decoder") && kind::name(bytes, tiff).is_none() {
-        return PictureError::NotAPicture { found: "a file of unknown kind", expected: FRAMES }.into();
+        return PictureError::NotAPicture { found: "a file of unknown kind", expected: FRAMES }
+            .into();
     }
     let unknown = text.contains("Couldn't find camera");
     kind::refused(bytes, tiff, unknown.then_some("of a camera that is not known"))

@@ -83,7 +83,8 @@ fn changing_opcode(list: &[u8]) -> Option<&'static str> {
     let (count, mut rest) = list.split_first_chunk::<4>()?;
     for _ in 0..u32::from_be_bytes(*count) {
         let (head, after) = rest.split_first_chunk::<16>()?;
-        let number = |at: usize| u32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let number =
+            |at: usize| u32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
         let name = match number(0) {
             7 => Some("MapTable"),
             8 => Some("MapPolynomial"),
@@ -129,9 +130,10 @@ pub(crate) fn layout_with(
         }
         (false, 1) => sensor::no_mosaic(Layout::Grey, hint, "a monochrome picture"),
         (false, 3) => sensor::no_mosaic(Layout::Rgb, hint, "an RGB picture"),
-        (_, n) => {
-            Err(DecodeError::unsupported(format!("sensor data of {n} samples per pixel"), CONVERT_TO_DNG))
-        }
+        (_, n) => Err(DecodeError::unsupported(
+            format!("sensor data of {n} samples per pixel"),
+            CONVERT_TO_DNG,
+        )),
     }
 }
 

@@ -82,7 +82,13 @@ fn narrow(bits: u32, exponent_bits: u32, mantissa_bits: u32) -> f32 {
     let fraction = f64::from(mantissa) / f64::from(1_u32 << mantissa_bits);
     let magnitude = match exponent {
         0 => fraction * f64::from(1 - bias).exp2(),
-        _ if exponent == largest => if mantissa == 0 { f64::INFINITY } else { f64::NAN },
+        _ if exponent == largest => {
+            if mantissa == 0 {
+                f64::INFINITY
+            } else {
+                f64::NAN
+            }
+        }
         _ => (1.0 + fraction) * f64::from(exponent as i32 - bias).exp2(),
     };
     let negative = bits >> (exponent_bits + mantissa_bits) & 1 == 1;

@@ -31,7 +31,9 @@ impl Frame {
         let full = self.saturation[0];
         Some(match (black, saturation) {
             (false, false) => return None,
-            (true, false) => "states no black level, which is taken as 0; set black_level".to_owned(),
+            (true, false) => {
+                "states no black level, which is taken as 0; set black_level".to_owned()
+            }
             (false, true) => format!(
                 "does not state where it saturates, which is taken as {full}; set saturation_level"
             ),

@@ -66,12 +66,12 @@ const COMPRESSIONS: [(u32, &str); 15] = [
 ];
 
 /// What to do with the files of sensors with three layers, which no DNG converter reads.
-const FOVEON: &str =
-    "save it as a 16-bit linear TIFF, or have the camera write DNG";
+const FOVEON: &str = "save it as a 16-bit linear TIFF, or have the camera write DNG";
 
 /// The format's name, and the camera's where the file says it; `None` for what is no camera's.
 pub(crate) fn name(bytes: &[u8], tiff: Option<&Tiff>) -> Option<String> {
-    let begins = |at: usize, with: &[u8]| bytes.get(at..).is_some_and(|rest| rest.starts_with(with));
+    let begins =
+        |at: usize, with: &[u8]| bytes.get(at..).is_some_and(|rest| rest.starts_with(with));
     let signed =
         SIGNATURES.iter().find(|(at, with, _)| begins(*at, with)).map(|(_, _, name)| *name);
     let text = |tag| tiff.and_then(|tiff| tiff.with(tag)).and_then(|found| found.text(tag));
@@ -129,8 +129,8 @@ pub(crate) fn is_container(bytes: &[u8], tiff: &Tiff) -> bool {
         matches!(directory.integer(tag::PHOTOMETRIC), Some(32_803 | 34_892))
             || directory.integer(tag::COMPRESSION).is_some_and(|number| VENDORS.contains(&number))
     };
-    let signed = bytes.get(8..10) == Some(b"CR")
-        || matches!(bytes.get(8..12), Some(b"IIII" | b"MMMM"));
+    let signed =
+        bytes.get(8..10) == Some(b"CR") || matches!(bytes.get(8..12), Some(b"IIII" | b"MMMM"));
     signed || tiff.directories.iter().any(sensor) || is_mostly_hidden(bytes, tiff)
 }
 

@@ -1,7 +1,7 @@
 //! What a file says of the camera.
 
-use super::tags::{Directory, Tiff, tag};
 use super::Metadata;
+use super::tags::{Directory, Tiff, tag};
 use crate::raster::PictureError;
 use crate::raster::guard::guarded;
 use std::io::Cursor;
@@ -74,9 +74,8 @@ pub(crate) fn from_exr(bytes: &[u8]) -> Metadata {
     };
     let Ok(meta) = guarded(read) else { return Metadata::default() };
     let Some(part) = meta.headers.first() else { return Metadata::default() };
-    let positive = |value: Option<f32>| {
-        value.map(f64::from).filter(|value| value.is_finite() && *value > 0.0)
-    };
+    let positive =
+        |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite() && *value > 0.0);
     let attributes = &part.own_attributes;
     Metadata {
         exposure_s: positive(attributes.exposure),

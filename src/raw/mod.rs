@@ -54,9 +54,7 @@ pub fn decode(bytes: &[u8], hint: &Hint) -> Result<Frame, DecodeError> {
         Some(format @ (Format::Png | Format::Jpeg)) => {
             picture::decode(bytes, format, Metadata::default(), hint)
         }
-        Some(Format::Exr) => {
-            picture::decode(bytes, Format::Exr, metadata::from_exr(bytes), hint)
-        }
+        Some(Format::Exr) => picture::decode(bytes, Format::Exr, metadata::from_exr(bytes), hint),
         Some(Format::Tiff) if !is_big_tiff(bytes) => decode_tiff(bytes, hint),
         Some(Format::Tiff) => picture::decode(bytes, Format::Tiff, Metadata::default(), hint),
         None => decode_stored(bytes, hint)?.into_frame(),
@@ -120,9 +118,9 @@ fn decode_stored(bytes: &[u8], hint: &Hint) -> Result<Stored, DecodeError> {
             return nef::decode(&tiff, directory, hint);
         }
         return camera::decode(bytes, Some(&tiff), hint).or_else(|error| match error {
-            DecodeError::Picture(PictureError::Unsupported { .. } | PictureError::NotAPicture { .. }) => {
-                tagged::decode(&tiff, directory, hint)
-            }
+            DecodeError::Picture(
+                PictureError::Unsupported { .. } | PictureError::NotAPicture { .. },
+            ) => tagged::decode(&tiff, directory, hint),
             error => Err(error),
         });
     }

@@ -49,7 +49,10 @@ pub(crate) fn decode(
         maker_note(tiff).ok_or_else(|| DecodeError::damaged("it has no Nikon maker note"))?;
     let kind = note.integer(note::COMPRESSION);
     if let Some((_, name)) = OTHER_KINDS.iter().find(|(number, _)| Some(*number) == kind) {
-        return Err(DecodeError::unsupported(*name, "set the camera to lossless compressed RAW, or convert it to DNG with Adobe DNG Converter"));
+        return Err(DecodeError::unsupported(
+            *name,
+            "set the camera to lossless compressed RAW, or convert it to DNG with Adobe DNG Converter",
+        ));
     }
     let coding = Coding::parse(&note, storage.bits)?;
     let mut stored = describe(tiff, directory, &note, &storage, hint)?;

@@ -99,11 +99,7 @@ fn makers_black(tiff: &Tiff, directory: &Directory, white: f64) -> Option<[f32; 
 
 /// The order of packed bits. TIFF's is most significant bit first; some cameras pack from the least, and do not say so: a
 /// picture read in the wrong order is noise.
-fn packing(
-    tiff: &Tiff,
-    directory: &Directory,
-    storage: &Storage,
-) -> Result<Packing, DecodeError> {
+fn packing(tiff: &Tiff, directory: &Directory, storage: &Storage) -> Result<Packing, DecodeError> {
     let packed = storage.packing == Packing::MostFirst && !matches!(storage.bits, 8 | 16);
     if storage.compression != 1 || !packed {
         return Ok(storage.packing);
@@ -125,4 +121,3 @@ fn packing(
     let (most, least) = (roughness(Packing::MostFirst)?, roughness(Packing::LeastFirst)?);
     Ok(if least.saturating_mul(ROUGHER) < most { Packing::LeastFirst } else { Packing::MostFirst })
 }
-

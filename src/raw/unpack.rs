@@ -75,7 +75,9 @@ impl Storage {
         let (segment, places) = segments(directory, width, height)?;
         let predictor = directory.integer(tag::PREDICTOR).unwrap_or(1);
         let stored_pixels = match directory.has(tag::TILE_OFFSETS) {
-            true => width.div_ceil(segment[0]) * height.div_ceil(segment[1]) * segment[0] * segment[1],
+            true => {
+                width.div_ceil(segment[0]) * height.div_ceil(segment[1]) * segment[0] * segment[1]
+            }
             false => width * height,
         };
         let stored = places.iter().fold(0, |sum: usize, place| sum.saturating_add(place[1]));
@@ -158,7 +160,10 @@ impl Storage {
         let across = self.width.div_ceil(self.segment[0]);
         let needed = across * self.height.div_ceil(self.segment[1]);
         let places = self.places.get(..needed).ok_or_else(|| {
-            DecodeError::damaged(format!("it has {} of {needed} strips or tiles", self.places.len()))
+            DecodeError::damaged(format!(
+                "it has {} of {needed} strips or tiles",
+                self.places.len()
+            ))
         })?;
         let mut row = vec![T::default(); self.segment[0] * self.samples_per_pixel];
         let row_bytes = (row.len() * self.stored_bits() as usize).div_ceil(8);

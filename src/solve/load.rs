@@ -6,7 +6,7 @@ use super::options::MaskChoice;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
-use crate::instrument::{CAMERA_FILE, Calibration, LIGHTS_FILE, Optics};
+use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE, Optics};
 use crate::machine::check_memory;
 use crate::raster::decode_mask;
 use crate::raw::{Frame, Histogram, ReadError, Samples, contradictions, mixed_encodings};
@@ -58,6 +58,8 @@ pub(crate) fn load(
     warnings.extend(contradictions(numbers()));
     warnings.extend(mixed_encodings(numbers()));
     warnings.extend(find_ceiling(&frames, &mut calibration));
+    warnings.extend(super::exposures::contradictions(session, &frames));
+    warnings.extend(assumed_levels(session, &frames, &calibration));
     let (drift, frames): (Vec<_>, Vec<_>) =
         session.frames.iter().zip(frames).partition(|(entry, _)| entry.drift_check);
     let mut scene = arrange(session, calibration, frames);
@@ -183,6 +185,21 @@ fn find_ceiling(frames: &[Frame], calibration: &mut Calibration) -> Option<Strin
     let ceiling = Histogram::of(frames)?.ceiling()?;
     calibration.color.clip_level = Some(ceiling.level.into());
     Some(ceiling.sentence())
+}
+
+/// Levels that a frame's file does not state and the calibration neither; told for the first such frame.
+fn assumed_levels(
+    session: &Session,
+    frames: &[Frame],
+    calibration: &Calibration,
+) -> Option<String> {
+    let color = &calibration.color;
+    let stated = [color.black_level.is_some(), color.saturation_level.is_some()];
+    let place = calibration.folder.join(COLOR_FILE);
+    session.frames.iter().zip(frames).find_map(|(entry, frame)| {
+        let what = frame.assumed_levels(stated)?;
+        Some(format!("{}: {what} in {}.", entry.file.display(), place.display()))
+    })
 }
 
 /// Decodes every frame, several at once; in the manifest's order.

@@ -13,6 +13,7 @@ mod drift;
 mod encode;
 mod error;
 mod estimate;
+mod exposures;
 mod field;
 mod field_grid;
 mod finish;

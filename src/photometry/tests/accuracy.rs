@@ -130,7 +130,8 @@ fn gross_outliers_cost_little() {
         check_outliers(&many_lights(12), count, most);
     }
     // Beyond what can be searched exactly.
-    for (lights, count, most) in [(20, 3, 1.05), (20, 4, 1.1), (40, 6, 1.05), (64, 16, 1.1), (100, 25, 1.1)]
+    for (lights, count, most) in
+        [(20, 3, 1.05), (20, 4, 1.1), (40, 6, 1.05), (64, 16, 1.1), (100, 25, 1.1)]
     {
         check_outliers(&many_lights(lights), count, most);
     }

@@ -309,7 +309,12 @@ fn short_float(value: f32, bits: u32) -> u32 {
 }
 
 /// A floating-point DNG of values with few digits, all of which every kind holds.
-pub(super) fn float_file(bits: u32, compression: u16, predictor: u16, order: Order) -> (Vec<u8>, Vec<f32>) {
+pub(super) fn float_file(
+    bits: u32,
+    compression: u16,
+    predictor: u16,
+    order: Order,
+) -> (Vec<u8>, Vec<f32>) {
     let values: Vec<f32> =
         (0..WIDTH * HEIGHT).map(|i| (0.25 + (i * 37 % 512) as f32 / 512.0) * 0.5).collect();
     let bytes = bits as usize / 8;
@@ -332,7 +337,9 @@ pub(super) fn float_file(bits: u32, compression: u16, predictor: u16, order: Ord
             34_895 => 4,
             _ => 1,
         };
-        (distance..plane.len()).rev().for_each(|i| plane[i] = plane[i].wrapping_sub(plane[i - distance]));
+        (distance..plane.len())
+            .rev()
+            .for_each(|i| plane[i] = plane[i].wrapping_sub(plane[i - distance]));
         plane
     };
     let mut data: Vec<u8> = values.chunks(WIDTH).flat_map(row).collect();

@@ -17,7 +17,11 @@ const UNKNOWN: [(&str, &str); 5] = [
 ];
 
 /// A file whose first directory is a thumbnail and whose second one, below it, holds the sensor's data.
-pub(super) fn container(order: Order, (make, model): (&'static str, &'static str), sensor: Entries) -> Vec<u8> {
+pub(super) fn container(
+    order: Order,
+    (make, model): (&'static str, &'static str),
+    sensor: Entries,
+) -> Vec<u8> {
     let long = |value: u32| Value::Long(vec![value]);
     let short = |value: u16| Value::Short(vec![value]);
     let first = vec![
@@ -61,7 +65,13 @@ fn every_maker_and_storage_gives_the_samples() {
     for order in [Order::Little, Order::Big] {
         for segment in [[WIDTH, HEIGHT], [WIDTH, 5], [16, 16], [48, 32]] {
             kinds.extend([8, 10, 12, 14, 16].map(|bits| Kind { order, bits, segment, ..PLAIN }));
-            kinds.extend([12, 14].map(|bits| Kind { order, bits, segment, compression: 7, ..PLAIN }));
+            kinds.extend([12, 14].map(|bits| Kind {
+                order,
+                bits,
+                segment,
+                compression: 7,
+                ..PLAIN
+            }));
             kinds.push(Kind { order, segment, compression: 8, ..PLAIN });
         }
     }
@@ -171,7 +181,8 @@ fn a_mosaic_that_is_not_stated_is_asked_for() {
 #[test]
 fn what_is_not_read_has_its_name() {
     let check = |bytes: &[u8], expected: &str| {
-        for encoding in [None, Some(crate::raw::Encoding::Linear), Some(crate::raw::Encoding::Srgb)] {
+        for encoding in [None, Some(crate::raw::Encoding::Linear), Some(crate::raw::Encoding::Srgb)]
+        {
             let error = decode(bytes, &Hint { cfa: None, encoding }).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}, not {expected}");
             assert!(error.contains("cannot be read; ") && error.lines().count() == 1, "{error}");
@@ -188,7 +199,10 @@ fn what_is_not_read_has_its_name() {
     raf[100..104].copy_from_slice(&200_u32.to_be_bytes());
     let inner = tiff(
         Order::Little,
-        &vec![(0xf000, Value::Directory(vec![(0xf007, Value::Blobs(vec![b"IS\x01\x10".to_vec()]))]))],
+        &vec![(
+            0xf000,
+            Value::Directory(vec![(0xf007, Value::Blobs(vec![b"IS\x01\x10".to_vec()]))]),
+        )],
     );
     raf.splice(200..200 + inner.len(), inner);
     check(&raf, "a Fujifilm RAF file (X-T99) with compression");

@@ -1,15 +1,12 @@
 //! How long and how sensitively pictures were taken, from their files.
 
 use super::{ImportError, Options};
+use crate::quantity::{EXPOSURE_S, ISO};
 use crate::raw::Metadata;
 use std::path::{Path, PathBuf};
 
 /// What one is taken as where no file states it: then only ratios matter, and all are equal.
 const UNSTATED: Exposure = Exposure { seconds: 1.0, iso: 100.0 };
-
-/// Numbers beyond these are rounding, or no measurement: seconds, ISO.
-const SECONDS: std::ops::RangeInclusive<f64> = 1e-6..=1e5;
-const ISO: std::ops::RangeInclusive<f64> = 1.0..=1e8;
 
 /// Stops by which apertures may differ: files round them.
 const SAME_APERTURE: f64 = 0.12;
@@ -37,8 +34,8 @@ impl Stated {
     pub(super) fn new(path: &Path, metadata: &Metadata) -> Self {
         Self {
             path: path.to_owned(),
-            seconds: metadata.exposure_s.filter(|value| SECONDS.contains(value)),
-            iso: metadata.iso.filter(|value| ISO.contains(value)),
+            seconds: metadata.exposure_s.filter(|value| EXPOSURE_S.check(*value).is_ok()),
+            iso: metadata.iso.filter(|value| ISO.check(*value).is_ok()),
             f_number: metadata.f_number.filter(|value| *value > 0.1 && *value < 1000.0),
         }
     }

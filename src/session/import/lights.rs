@@ -88,9 +88,7 @@ impl LightList {
         let lines = text::read(&list)?;
         let rows = match table::read(&list, &lines, 3, Some(count)) {
             Ok(table) => table.rows,
-            Err(error) => {
-                table::read(&list, &lines, 1, Some(count)).map_err(|_| error)?.rows
-            }
+            Err(error) => table::read(&list, &lines, 1, Some(count)).map_err(|_| error)?.rows,
         };
         let rows = self.in_order(rows);
         if rows.len() != count {

@@ -20,7 +20,9 @@ use self::pairs::Pair;
 use self::pictures::Frame;
 use super::{Encoding, FrameEntry, Kind, Session, SessionError};
 use crate::files::{FileError, Input, OutputKind, Provenance, StagedFolder, sha256_of_file};
-use crate::instrument::{COLOR_FILE, CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights};
+use crate::instrument::{
+    COLOR_FILE, CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights,
+};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::{Cfa, DirectionalLight, Light};

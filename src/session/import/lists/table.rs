@@ -103,9 +103,8 @@ fn row((number, line): &Numbered, separator: Separator, columns: usize) -> Optio
         tokens.get(at..at + columns)?.iter().map(value).collect::<Option<Vec<f64>>>()
     };
     // Remarks stand behind the numbers.
-    let remark = (columns..tokens.len()).find(|&k| {
-        tokens[k].starts_remark() && numbers_at(&tokens, k - columns).is_some()
-    });
+    let remark = (columns..tokens.len())
+        .find(|&k| tokens[k].starts_remark() && numbers_at(&tokens, k - columns).is_some());
     tokens.truncate(remark.unwrap_or(tokens.len()));
     let found = |names, values, index, has_more| {
         Some(Row { number: *number, names, values, index, has_more })
@@ -115,7 +114,9 @@ fn row((number, line): &Numbered, separator: Separator, columns: usize) -> Optio
         .find(|&k| tokens[k].is_picture() && numbers_at(&tokens, k + 1).is_some());
     if let Some(end) = named_end {
         let rest = &tokens[end + 1 + columns..];
-        if separator == Separator::Comma && rest.len() == columns && rest.iter().all(Token::is_digits)
+        if separator == Separator::Comma
+            && rest.len() == columns
+            && rest.iter().all(Token::is_digits)
         {
             // Decimal commas between commas: no telling which is which.
             return None;
@@ -126,7 +127,8 @@ fn row((number, line): &Numbered, separator: Separator, columns: usize) -> Optio
     let before = tokens.len().checked_sub(columns)?;
     let behind = tokens.last().is_some_and(Token::is_picture);
     for skipped in [0, 1] {
-        if behind && before > skipped
+        if behind
+            && before > skipped
             && value(&tokens[skipped + columns]).is_none()
             && let Some(values) = numbers_at(&tokens, skipped)
         {
@@ -243,7 +245,8 @@ fn tokens(line: &str, separator: Separator) -> Vec<Token> {
     };
     let mut found = Vec::new();
     let mut at = 0;
-    while let Some(offset) = line[at..].find(|letter: char| !parts(letter) && !letter.is_whitespace())
+    while let Some(offset) =
+        line[at..].find(|letter: char| !parts(letter) && !letter.is_whitespace())
     {
         let start = at + offset;
         let rest = &line[start..];
@@ -267,8 +270,14 @@ fn tokens(line: &str, separator: Separator) -> Vec<Token> {
 }
 
 /// Pairs of quotation marks.
-const QUOTES: [(char, &str); 6] =
-    [('"', "\""), ('\'', "'"), ('\u{201c}', "\u{201d}"), ('\u{201e}', "\u{201c}\u{201d}"), ('\u{2018}', "\u{2019}"), ('\u{ab}', "\u{bb}")];
+const QUOTES: [(char, &str); 6] = [
+    ('"', "\""),
+    ('\'', "'"),
+    ('\u{201c}', "\u{201d}"),
+    ('\u{201e}', "\u{201c}\u{201d}"),
+    ('\u{2018}', "\u{2019}"),
+    ('\u{ab}', "\u{bb}"),
+];
 
 /// The text between the quotation marks that `rest` begins with, and how many bytes they span; a doubled mark stands for
 /// itself.
@@ -315,7 +324,11 @@ fn is_comment(line: &str, columns: usize) -> bool {
     let named = || {
         let numbered = (0, line.to_owned());
         let row = row(&numbered, Separator::Space, columns);
-        row.is_some_and(|row| row.names.first().is_some_and(|name| is_picture_name(name) && !name.contains(char::is_whitespace)))
+        row.is_some_and(|row| {
+            row.names
+                .first()
+                .is_some_and(|name| is_picture_name(name) && !name.contains(char::is_whitespace))
+        })
     };
     marked && !named()
 }

@@ -5,7 +5,8 @@ fn numbered(text: &str) -> Vec<Numbered> {
 }
 
 fn parsed(text: &str) -> Result<Vec<(Vec<String>, Vec<f64>)>, String> {
-    let table = read(Path::new("l"), &numbered(text), 3, None).map_err(|error| error.to_string())?;
+    let table =
+        read(Path::new("l"), &numbered(text), 3, None).map_err(|error| error.to_string())?;
     Ok(table.rows.into_iter().map(|row| (row.names, row.values)).collect())
 }
 

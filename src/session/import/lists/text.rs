@@ -15,7 +15,8 @@ pub(in super::super) type Numbered = (usize, String);
 
 /// The lines that say something: trimmed, without blank ones.
 pub(in super::super) fn read(path: &Path) -> Result<Vec<Numbered>, FileError> {
-    let bytes = read_input(path, InputKind::Text).map_err(|source| FileError::read(path, source))?;
+    let bytes =
+        read_input(path, InputKind::Text).map_err(|source| FileError::read(path, source))?;
     let no_list = || FileError::Content {
         path: path.to_owned(),
         what: "is not a list of text lines; give an .lp file, or a list with one direction a line"
@@ -104,8 +105,10 @@ mod tests {
             format!("{text}\u{1a}\0\0").into(),
         ];
         for (kind, bytes) in kinds.iter().enumerate() {
-            let found: Vec<String> =
-                lines(up_to_end(&decode(bytes)).unwrap()).into_iter().map(|(_, line)| line).collect();
+            let found: Vec<String> = lines(up_to_end(&decode(bytes)).unwrap())
+                .into_iter()
+                .map(|(_, line)| line)
+                .collect();
             assert_eq!(found, ["2", "münze 1.png 0 0 1", "b.png 0 1 1"], "kind {kind}");
         }
         assert_eq!(lines(text)[2], (4, "b.png 0 1 1".to_owned()));

@@ -43,20 +43,27 @@ fn pictures_given_choose_their_lights() {
     let lights = Calibration::load(&summary.calibration).unwrap().lights;
     let Light::Directional(far) = &lights[3].light else { panic!("{:?}", lights[3]) };
     let angle = 299.0_f64 * 2.4;
-    let expected = nalgebra::Vector3::new(0.5 * angle.cos(), 0.5 * angle.sin(), 0.4 + 0.5 * 299.0 / 300.0);
+    let expected =
+        nalgebra::Vector3::new(0.5 * angle.cos(), 0.5 * angle.sin(), 0.4 + 0.5 * 299.0 / 300.0);
     assert!((far.direction.into_inner() - expected.normalize()).norm() < 1e-12);
-    let error = set.import(&Options { out: set.path("other"), ..set.options("dome.lp", &chosen[..2]) });
-    assert_eq!(error.unwrap_err(), "dome.lp: 2 of its 300 lights are chosen; a solve takes 3 to 256");
+    let error =
+        set.import(&Options { out: set.path("other"), ..set.options("dome.lp", &chosen[..2]) });
+    assert_eq!(
+        error.unwrap_err(),
+        "dome.lp: 2 of its 300 lights are chosen; a solve takes 3 to 256"
+    );
 }
 
 #[test]
 fn a_name_that_fits_nothing_is_a_mistake() {
     let set = dome(5);
     picture(&set.path("x1.png"), 4, 3, 7);
-    let error = set
-        .import(&set.options("dome.lp", &["d0.png", "d2.png", "d3.png", "x1.png"]))
-        .unwrap_err();
-    assert!(error.starts_with("dome.lp:3: names d1.png, which is not among the pictures given"), "{error}");
+    let error =
+        set.import(&set.options("dome.lp", &["d0.png", "d2.png", "d3.png", "x1.png"])).unwrap_err();
+    assert!(
+        error.starts_with("dome.lp:3: names d1.png, which is not among the pictures given"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -65,22 +72,35 @@ fn copies_are_told() {
     fs::copy(set.path("a.png"), set.path("b.png")).unwrap();
     let (_, summary) = set.import(&set.options("l.txt", &["a.png", "b.png", "c.png"])).unwrap();
     let [warning] = summary.warnings.as_slice() else { panic!("{:?}", summary.warnings) };
-    assert!(warning.contains("a.png and") && warning.contains("b.png (lights 0 and 1) are the same picture"), "{warning}");
+    assert!(
+        warning.contains("a.png and")
+            && warning.contains("b.png (lights 0 and 1) are the same picture"),
+        "{warning}"
+    );
     // The same samples in another file.
     fs::remove_dir_all(set.path("out")).unwrap();
     let rgb = image::open(set.path("c.png")).unwrap();
     rgb.save(set.path("d.tif")).unwrap();
     let (_, summary) = set.import(&set.options("l.txt", &["a.png", "c.png", "d.tif"])).unwrap();
-    assert!(summary.warnings[0].contains("(lights 1 and 2) hold the same picture"), "{:?}", summary.warnings);
+    assert!(
+        summary.warnings[0].contains("(lights 1 and 2) hold the same picture"),
+        "{:?}",
+        summary.warnings
+    );
     fs::remove_dir_all(set.path("out")).unwrap();
     let (_, summary) = set.import(&set.options("l.txt", &["a.png", "c.png", "c.png"])).unwrap();
-    assert!(summary.warnings[0].contains("c.png is given for lights 1 and 2"), "{:?}", summary.warnings);
+    assert!(
+        summary.warnings[0].contains("c.png is given for lights 1 and 2"),
+        "{:?}",
+        summary.warnings
+    );
 }
 
 /// A grey picture whose 2 x 2 cells hold these shares of a smooth shade.
 fn cells(path: &Path, shares: [f64; 4], turn: f64) {
     let picture = ImageBuffer::from_fn(64, 48, |x, y| {
-        let shade = 20_000.0 + 10_000.0 * ((f64::from(x) * 0.07 + turn).sin() + (f64::from(y) * 0.09).cos());
+        let shade = 20_000.0
+            + 10_000.0 * ((f64::from(x) * 0.07 + turn).sin() + (f64::from(y) * 0.09).cos());
         Luma([(shade * shares[(y % 2 * 2 + x % 2) as usize]) as u16])
     });
     picture.save(path).unwrap();
@@ -96,7 +116,11 @@ fn a_mosaic_is_imported_as_one_and_suspected_where_it_is_not_said() {
     let mut options = set.options("l.txt", &names);
     let (session, summary) = set.import(&options).unwrap();
     assert_eq!(session.frames[0].cfa, None);
-    assert!(summary.warnings[0].contains("look like a colour sensor's mosaic"), "{:?}", summary.warnings);
+    assert!(
+        summary.warnings[0].contains("look like a colour sensor's mosaic"),
+        "{:?}",
+        summary.warnings
+    );
     fs::remove_dir_all(set.path("out")).unwrap();
     options.cfa = Cfa::parse("GBRG");
     let (session, summary) = set.import(&options).unwrap();

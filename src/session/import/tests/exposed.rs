@@ -4,7 +4,13 @@ use super::*;
 
 /// A grey TIFF of 16 bits, different for each `shade`, whose tags state what is given: seconds as a fraction, ISO, and the
 /// f-number in tenths.
-fn stating(path: &Path, shade: u16, seconds: Option<[u32; 2]>, iso: Option<u16>, tenths: Option<u32>) {
+fn stating(
+    path: &Path,
+    shade: u16,
+    seconds: Option<[u32; 2]>,
+    iso: Option<u16>,
+    tenths: Option<u32>,
+) {
     let mut tags: Vec<[u32; 4]> = vec![
         [0x100, 4, 1, 4],
         [0x101, 4, 1, 3],
@@ -95,7 +101,10 @@ fn silent_files_among_others() {
     let second = (Some([1, 1]), Some(400), None);
     let stated = [quarter, (None, Some(400), None), second];
     let error = import(stated, false, None).unwrap_err();
-    assert!(error.starts_with("b.tif: states no exposure time, but the others state 1/4 s to 1 s"), "{error}");
+    assert!(
+        error.starts_with("b.tif: states no exposure time, but the others state 1/4 s to 1 s"),
+        "{error}"
+    );
     let (found, _) = import(stated, true, None).unwrap();
     assert_eq!(found, [[0.25, 400.0]; 3]);
 }
