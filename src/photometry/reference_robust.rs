@@ -83,14 +83,17 @@ impl Samples<'_> {
             if self.normal_matrix(weights, kept).determinant() < LEAST_DETERMINANT * determinant {
                 continue;
             }
-            let only = std::array::from_fn(|i| if kept >> i & 1 == 1 { weights[i] } else { 0.0 });
+            let kept_lights = LightSet::from(kept);
+            let only =
+                std::array::from_fn(|i| if kept_lights.contains(i) { weights[i] } else { 0.0 });
             let Some(solution) = self.solve(only) else { continue };
             let cost = self.chi_square(&solution) + DROP_PENALTY * count as f64;
             if cost < best.0 {
                 best = (cost, kept);
             }
         }
-        best.0.is_finite().then(|| std::array::from_fn(|i| best.1 >> i & 1 == 1))
+        let kept = LightSet::from(best.1);
+        best.0.is_finite().then(|| std::array::from_fn(|i| kept.contains(i)))
     }
 
     fn normal_matrix(&self, weights: &[f64; MAX_LIGHTS], set: u64) -> Matrix3<f64> {
