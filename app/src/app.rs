@@ -1,12 +1,15 @@
 //! The window as a whole: the rooms' rail, the room that is open, what is going on, what went wrong, and the keys.
 
-use crate::desk::{Activity, Brake, Desk, Problem};
+use crate::desk::{Activity, Area, Brake, Desk, Problem};
 use crate::keeper::Keeper;
+use crate::problems::Problems;
+use crate::questions::{Answer, Question};
 use crate::rooms::{
     Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan::Scan, scans::Scans,
     welcome::Welcome,
 };
 use crate::settings::{Settings, Theme};
+use crate::window::Geometry;
 use crate::worker::{Command, Update, Worker};
 use crate::{texts, theme, widgets};
 use eframe::egui::{self, Key, Modifiers, RichText};
@@ -26,6 +29,13 @@ pub struct App {
     scans: Scans,
     /// The room that was drawn last.
     shown: Option<Room>,
+    window: Geometry,
+    problems: Problems,
+    question: Option<Question>,
+    /// Whether Escape has something to leave or close before it ends work: a field, a menu, a question, a drag.
+    escape_is_taken: bool,
+    /// The window may close.
+    closes: bool,
 }
 
 impl App {
@@ -40,10 +50,18 @@ impl App {
         }
         match settings.rig.as_ref() {
             Some(rig) if rig.exists() => worker.ask(Command::Open(rig.clone())),
-            Some(rig) => desk.tell(Problem::warning(texts::rig::OPENING, texts::rig::gone(rig))),
+            Some(rig) => {
+                let gone = Problem::warning(texts::rig::OPENING, texts::rig::gone(rig));
+                desk.tell(gone.of(Area::Opening));
+            }
             None => {}
         }
         Self {
+            window: Geometry::new(&settings),
+            problems: Problems::default(),
+            question: None,
+            escape_is_taken: false,
+            closes: false,
             desk,
             worker,
             keeper: Keeper::start(settings),
@@ -62,9 +80,19 @@ impl App {
         &self.desk
     }
 
+    /// The same, to be changed.
+    pub fn desk_mut(&mut self) -> &mut Desk {
+        &mut self.desk
+    }
+
     /// Leaves something to be done, as rooms do.
     pub fn ask(&mut self, command: Command) {
         self.desk.ask(command);
+    }
+
+    /// What is being asked over everything else.
+    pub fn question(&self) -> Option<&Question> {
+        self.question.as_ref()
     }
 
     /// Opens a room.
@@ -97,6 +125,7 @@ impl App {
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
+                desk.problems.retain(|problem| problem.area != Some(Area::Opening));
                 self.scan.reset(desk);
                 self.scans.reset(desk);
                 self.rig.reset(desk);
@@ -120,14 +149,23 @@ impl App {
             }
         }
         for command in self.desk.take_asked() {
+            // What went wrong the last time is told again if it goes wrong again.
+            if let Some(area) = command.tries() {
+                self.desk.forget_errors(area);
+            }
             self.worker.ask(command);
         }
     }
 
     fn keep_settings(&mut self) {
         self.keeper.look_at(&self.desk.settings);
-        if let Some(text) = self.keeper.trouble() {
-            self.desk.tell(Problem::error(texts::KEEPING_SETTINGS, text));
+        match self.keeper.news() {
+            Some(Err(text)) => {
+                let problem = Problem::error(texts::KEEPING_SETTINGS, text);
+                self.desk.tell(problem.of(Area::Settings));
+            }
+            Some(Ok(())) => self.desk.forget_errors(Area::Settings),
+            None => {}
         }
     }
 
@@ -163,7 +201,8 @@ impl App {
         }
     }
 
-    /// Control and a digit opens a room, Escape ends what is going on, Control and Q leaves; a folder that is dropped is opened.
+    /// Control and a digit opens a room, Control and Q leaves, Escape ends work where it has nothing else to end; a folder that
+    /// is dropped is opened.
     fn keys(&mut self, ctx: &egui::Context) {
         const DIGITS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         for (room, digit) in Room::ALL.into_iter().zip(DIGITS) {
@@ -174,12 +213,62 @@ impl App {
         if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q)) {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
-        if self.desk.is_busy() && ctx.input(|input| input.key_pressed(Key::Escape)) {
-            self.worker.brake.cancel();
+        let escape = ctx.input(|input| input.key_pressed(Key::Escape));
+        if escape && self.desk.is_busy() && !self.escape_is_taken {
+            match self.worker.brake.is_capturing() {
+                // Frames are hours of somebody's work: one key does not end them.
+                true => self.question = Some(Question::StopScan),
+                false => self.worker.brake.cancel(),
+            }
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         if let Some(path) = dropped.into_iter().next().map(|file| file.path().to_owned()) {
             self.desk.ask(Command::Dropped(path));
+        }
+    }
+
+    /// The window is to close, by Control and Q or its own button: what could be lost is asked about first, and work that is
+    /// under way comes to its end.
+    fn closing(&mut self, ctx: &egui::Context) {
+        let wanted = ctx.input(|input| input.viewport().close_requested());
+        if wanted && !self.closes && self.question != Some(Question::Ending) {
+            if self.worker.brake.is_capturing() {
+                self.question = Some(Question::QuitWhileScanning);
+            } else if self.worker.is_idle() {
+                return;
+            } else {
+                self.end();
+            }
+            ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+        }
+        if self.question == Some(Question::Ending) && self.worker.is_idle() {
+            self.closes = true;
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    /// Ends all work; then the window closes.
+    fn end(&mut self) {
+        self.worker.brake.close();
+        self.question = Some(Question::Ending);
+    }
+
+    /// A question is drawn over everything else; one about a scan that has ended meanwhile is none any more.
+    fn put_question(&mut self, ctx: &egui::Context) {
+        let about_scan =
+            matches!(self.question, Some(Question::StopScan | Question::QuitWhileScanning));
+        if about_scan && !self.worker.brake.is_capturing() {
+            self.question = None;
+        }
+        let Some(question) = self.question.clone() else { return };
+        match (question.ui(ctx), question) {
+            (None, _) => {}
+            (Some(Answer::Stay), _) => self.question = None,
+            (Some(Answer::Yes), Question::StopScan) => {
+                self.worker.brake.cancel();
+                self.question = None;
+            }
+            (Some(Answer::Yes), _) => self.end(),
         }
     }
 
@@ -199,12 +288,20 @@ impl App {
             }
         });
         ui.with_layout(egui::Layout::bottom_up(egui::Align::Min), |ui| {
-            ui.menu_button(texts::VIEW, |ui| view_menu(ui, &mut self.desk.settings));
+            widgets::menu(ui, texts::VIEW, |ui| {
+                // A small window has no room for all of it.
+                let room = ui.ctx().content_rect().height() - 60.0;
+                let settings = &mut self.desk.settings;
+                egui::ScrollArea::vertical()
+                    .max_height(room)
+                    .show(ui, |ui| view_menu(ui, settings));
+            });
         });
     }
 
     fn status(&mut self, ui: &mut egui::Ui) {
         ui.horizontal_centered(|ui| {
+            self.problems.button(ui, &self.desk.problems);
             match &self.desk.activity {
                 Some(activity) => {
                     if widgets::activity(ui, activity) {
@@ -221,29 +318,6 @@ impl App {
                     ui.label(RichText::new(&place.rig.name).weak()).on_hover_text(folder);
                 });
             }
-        });
-    }
-
-    fn problems(&mut self, ui: &mut egui::Ui) {
-        ui.horizontal(|ui| {
-            ui.label(RichText::new(texts::PROBLEMS).strong());
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.small_button(texts::DISMISS_ALL).clicked() {
-                    self.desk.problems.clear();
-                }
-            });
-        });
-        egui::ScrollArea::vertical().show(ui, |ui| {
-            ui.set_width(ui.available_width());
-            // The newest first.
-            let problems = std::mem::take(&mut self.desk.problems);
-            let mut kept: Vec<_> = problems
-                .into_iter()
-                .rev()
-                .filter(|problem| !widgets::problem(ui, problem))
-                .collect();
-            kept.reverse();
-            self.desk.problems = kept;
         });
     }
 }
@@ -275,6 +349,7 @@ impl eframe::App for App {
         let updates: Vec<Update> = self.worker.updates().collect();
         updates.into_iter().for_each(|update| self.hear(update));
         self.keys(ctx);
+        self.closing(ctx);
         self.rooms_change();
         self.hand_over();
         self.keep_settings();
@@ -282,16 +357,17 @@ impl eframe::App for App {
 
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         egui::Panel::bottom("status").exact_size(40.0).show(ui, |ui| self.status(ui));
-        if !self.desk.problems.is_empty() {
-            // As many as are there, up to three; more by scrolling.
-            let height = 44.0 + 66.0 * self.desk.problems.len().min(3) as f32;
-            let panel = egui::Panel::bottom("problems").exact_size(height);
-            panel.show(ui, |ui| self.problems(ui));
-        }
         egui::Panel::left("rail").exact_size(116.0).resizable(false).show(ui, |ui| self.rail(ui));
         egui::CentralPanel::default().show(ui, |ui| self.room(ui));
-        let size = ui.ctx().content_rect().size();
-        self.desk.settings.window_size = [size.x, size.y];
+        let ctx = ui.ctx().clone();
+        self.problems.ui(&ctx, &mut self.desk.problems);
+        self.put_question(&ctx);
+        widgets::show_focus(&ctx);
+        self.window.follow(&ctx, &mut self.desk.settings);
+        self.escape_is_taken = self.question.is_some()
+            || ctx.dragged_id().is_some()
+            || egui::Popup::is_any_open(&ctx)
+            || ctx.memory(|memory| memory.focused().is_some());
         self.hand_over();
     }
 

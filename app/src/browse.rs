@@ -1,7 +1,8 @@
 //! The system's dialogue for folders and files. It waits in a thread of its own: the window goes on drawing, and a scan goes on, while it is
 //! open.
 
-use crate::texts;
+use crate::texts::{self, shell};
+use crate::widgets::Sign;
 use eframe::egui;
 use std::future::Future;
 use std::path::PathBuf;
@@ -11,7 +12,18 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 #[derive(Debug, Default)]
 pub struct Browse {
     /// `None` where no dialogue is open.
-    answer: Option<Receiver<Option<PathBuf>>>,
+    answer: Option<Receiver<Answer>>,
+    /// The desktop has none, and that is being said.
+    none: bool,
+}
+
+/// What came of it.
+#[derive(Debug)]
+enum Answer {
+    Chosen(PathBuf),
+    Closed,
+    /// There is nothing that could show one.
+    None,
 }
 
 impl Browse {
@@ -29,26 +41,46 @@ impl Browse {
     where
         D: Future<Output = Option<rfd::FileHandle>> + Send + 'static,
     {
-        let button = egui::Button::new(texts::BROWSE);
-        if ui.add_enabled(self.answer.is_none(), button).clicked() {
+        let button = ui.add_enabled(self.answer.is_none(), egui::Button::new(texts::BROWSE));
+        if button.clicked() {
             let dialogue = dialogue();
-            self.open(ui.ctx(), async { dialogue.await.map(PathBuf::from) });
+            self.open(ui.ctx(), has_dialogue, async { dialogue.await.map(PathBuf::from) });
         }
+        self.say_none(&button);
         self.take()
     }
 
-    /// Waits for a dialogue, beside the window.
+    /// Where there is no dialogue: that, what would bring one, and what goes without.
+    fn say_none(&mut self, button: &egui::Response) {
+        egui::Popup::from_response(button)
+            .open_bool(&mut self.none)
+            .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
+            .width(320.0)
+            .show(|ui| {
+                ui.horizontal_top(|ui| {
+                    Sign::Warning.ui(ui);
+                    ui.add(egui::Label::new(shell::NO_DIALOGUE).wrap().selectable(true));
+                });
+            });
+    }
+
+    /// Waits for a dialogue, beside the window. `available`: whether there is one; that may take its time, too.
     fn open(
         &mut self,
         ctx: &egui::Context,
+        available: impl FnOnce() -> bool + Send + 'static,
         dialogue: impl Future<Output = Option<PathBuf>> + Send + 'static,
     ) {
         let (sender, answer) = mpsc::channel();
         let ctx = ctx.clone();
         // Without a thread there is no dialogue, as if it had been closed.
         let _ = weavelight::machine::spawn("dialogue", move || {
-            // Whoever asked may be gone by then.
-            let _ = sender.send(pollster::block_on(dialogue));
+            let answer = match available() {
+                true => pollster::block_on(dialogue).map_or(Answer::Closed, Answer::Chosen),
+                false => Answer::None,
+            };
+            // The window may be gone by then.
+            let _ = sender.send(answer);
             ctx.request_repaint();
         });
         self.answer = Some(answer);
@@ -57,23 +89,69 @@ impl Browse {
     fn take(&mut self) -> Option<PathBuf> {
         let answer = match self.answer.as_ref()?.try_recv() {
             Err(TryRecvError::Empty) => return None,
-            answer => answer.ok().flatten(),
+            answer => answer.unwrap_or(Answer::Closed),
         };
         self.answer = None;
-        answer
+        match answer {
+            Answer::Chosen(path) => Some(path),
+            Answer::Closed => None,
+            Answer::None => {
+                self.none = true;
+                None
+            }
+        }
     }
+}
+
+/// Whether something can show a dialogue: without, it would be as if the user had closed it.
+#[cfg(target_os = "linux")]
+fn has_dialogue() -> bool {
+    has_portal() || has_program("zenity")
+}
+
+/// Other systems bring one.
+#[cfg(not(target_os = "linux"))]
+fn has_dialogue() -> bool {
+    true
+}
+
+/// Whether the desktop's portal chooses files. It does so only with a backend of that desktop.
+#[cfg(target_os = "linux")]
+fn has_portal() -> bool {
+    use zbus::blocking::{Proxy, connection::Builder};
+    // A portal that is not running yet is started by the question.
+    const PATIENCE: std::time::Duration = std::time::Duration::from_secs(15);
+    let version = || -> zbus::Result<u32> {
+        let bus = Builder::session()?.method_timeout(PATIENCE).build()?;
+        let chooser = Proxy::new(
+            &bus,
+            "org.freedesktop.portal.Desktop",
+            "/org/freedesktop/portal/desktop",
+            "org.freedesktop.portal.FileChooser",
+        )?;
+        chooser.get_property("version")
+    };
+    version().is_ok()
+}
+
+#[cfg(target_os = "linux")]
+fn has_program(name: &str) -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&folders).any(|folder| folder.join(name).is_file())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui_kittest::kittest::Queryable;
     use std::time::{Duration, Instant};
 
     /// What is answered, `None` for a dialogue that was closed; the frame before is drawn without it.
     fn check(chosen: Option<PathBuf>) {
         let mut browse = Browse::default();
         let (choose, choice) = mpsc::channel();
-        browse.open(&egui::Context::default(), async move { choice.recv().unwrap_or(None) });
+        let dialogue = async move { choice.recv().unwrap_or(None) };
+        browse.open(&egui::Context::default(), || true, dialogue);
         assert_eq!((browse.take(), browse.answer.is_some()), (None, true), "it is still open");
         choose.send(chosen.clone()).unwrap();
         let begun = Instant::now();
@@ -84,6 +162,31 @@ mod tests {
             std::thread::yield_now();
         }
         assert_eq!((found, browse.take()), (chosen, None));
+    }
+
+    #[test]
+    fn where_there_is_no_dialogue_that_is_said() {
+        let mut browse = Browse::default();
+        let dialogue = async { panic!("there is none to be opened") };
+        browse.open(&egui::Context::default(), || false, dialogue);
+        let begun = Instant::now();
+        while browse.answer.is_some() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no answer");
+            assert_eq!(browse.take(), None);
+            std::thread::yield_now();
+        }
+        assert!(browse.none);
+        let mut window = egui_kittest::Harness::new_ui(|ui| {
+            assert_eq!(browse.folder(ui), None);
+        });
+        window.run();
+        window.get_by_label_contains("zenity");
+        window.get_by_label_contains("type or paste the path");
+        // It goes with a click elsewhere.
+        window.drag_at(egui::pos2(700.0, 500.0));
+        window.drop_at(egui::pos2(700.0, 500.0));
+        window.run();
+        assert!(window.query_by_label_contains("zenity").is_none());
     }
 
     #[test]

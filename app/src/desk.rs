@@ -44,6 +44,27 @@ pub struct Problem {
     pub text: String,
     /// Whether the work failed, or is done and this ought to be known.
     pub severity: Severity,
+    /// What it belongs to; `None` where that is not known.
+    pub area: Option<Area>,
+}
+
+/// What a problem belongs to: the next try there shows whether it is still one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Area {
+    /// Opening a rig.
+    Opening,
+    /// Board, camera and lights.
+    Rig,
+    /// Calibrating.
+    Calibrate,
+    /// Scanning and solving.
+    Scan,
+    /// Looking at a solution.
+    Look,
+    /// The gallery of scans.
+    Scans,
+    /// Keeping the settings.
+    Settings,
 }
 
 /// Characters of a problem: names of files and what is in them may be any length.
@@ -56,7 +77,13 @@ impl Problem {
             title: title.into(),
             text: one_line(&text.into(), LONGEST),
             severity: Severity::Error,
+            area: None,
         }
+    }
+
+    /// The same, of an area.
+    pub fn of(self, area: Area) -> Self {
+        Self { area: Some(area), ..self }
     }
 
     /// Something that ought to be known.
@@ -65,6 +92,7 @@ impl Problem {
             title: title.into(),
             text: one_line(&text.into(), LONGEST),
             severity: Severity::Warning,
+            area: None,
         }
     }
 }
@@ -164,6 +192,13 @@ impl Desk {
     /// Opens another room.
     pub fn go_to(&mut self, room: Room) {
         self.settings.room = room;
+    }
+
+    /// Puts away the errors of an area, where it is tried once more.
+    pub fn forget_errors(&mut self, area: Area) {
+        let stays =
+            |problem: &Problem| problem.area != Some(area) || problem.severity == Severity::Warning;
+        self.problems.retain(stays);
     }
 
     /// Puts up a problem; the same one twice is one.

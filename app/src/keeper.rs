@@ -15,7 +15,7 @@ pub struct Keeper {
     /// As they are kept, or will soon be.
     known: Settings,
     changes: Option<Sender<Settings>>,
-    troubles: Receiver<String>,
+    news: Receiver<Result<(), String>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -23,9 +23,9 @@ impl Keeper {
     /// Begins with settings as they are on the disk.
     pub fn start(known: Settings) -> Self {
         let (changes, inbox) = mpsc::channel();
-        let (outbox, troubles) = mpsc::channel();
+        let (outbox, news) = mpsc::channel();
         let thread = weavelight::machine::spawn("settings", move || keep(&inbox, &outbox)).ok();
-        Self { known, changes: Some(changes), troubles, thread }
+        Self { known, changes: Some(changes), news, thread }
     }
 
     /// Keeps them where they differ from what is kept.
@@ -39,9 +39,9 @@ impl Keeper {
         }
     }
 
-    /// Why they could not be kept, once.
-    pub fn trouble(&self) -> Option<String> {
-        self.troubles.try_recv().ok()
+    /// That they were kept, or why they could not be, once.
+    pub fn news(&self) -> Option<Result<(), String>> {
+        self.news.try_recv().ok()
     }
 }
 
@@ -53,15 +53,13 @@ impl Drop for Keeper {
     }
 }
 
-fn keep(inbox: &Receiver<Settings>, troubles: &Sender<String>) {
+fn keep(inbox: &Receiver<Settings>, news: &Sender<Result<(), String>>) {
     while let Ok(mut newest) = inbox.recv() {
         while let Ok(newer) = inbox.recv_timeout(QUIET) {
             newest = newer;
         }
-        if let Err(error) = newest.save() {
-            // There may be nobody left to be told.
-            let _ = troubles.send(error.to_string());
-        }
+        // The window may be gone by then.
+        let _ = news.send(newest.save().map_err(|error| error.to_string()));
     }
 }
 
@@ -104,11 +102,23 @@ mod tests {
         let begun = Instant::now();
         let trouble = loop {
             assert!(begun.elapsed() < PATIENCE, "not told");
-            if let Some(trouble) = keeper.trouble() {
+            if let Some(Err(trouble)) = keeper.news() {
                 break trouble;
             }
             std::thread::yield_now();
         };
         assert!(trouble.contains("settings.toml"), "{trouble}");
+        // Once the way is free, that is news, too.
+        std::fs::remove_file(&blocked).unwrap();
+        settings.scale = 1.5;
+        keeper.look_at(&settings);
+        let kept = loop {
+            assert!(begun.elapsed() < PATIENCE, "not kept");
+            if let Some(news) = keeper.news() {
+                break news;
+            }
+            std::thread::yield_now();
+        };
+        assert_eq!(kept, Ok(()));
     }
 }

@@ -1,20 +1,16 @@
 //! The desktop app's executable; `weavelight gui` starts it.
 
-use eframe::egui;
 use weavelight_app::{App, settings::Settings, texts};
 
 fn main() -> eframe::Result {
     weavelight::machine::start();
     weavelight::files::survive_size_limits();
     let settings = Settings::load();
-    let size = settings.window_size;
     let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
+        viewport: weavelight_app::window::builder(&settings)
             .with_app_id("weavelight")
             .with_title(texts::TITLE)
-            .with_icon(weavelight_app::theme::icon())
-            .with_inner_size(size)
-            .with_min_inner_size([800.0, 560.0]),
+            .with_icon(weavelight_app::theme::icon()),
         ..Default::default()
     };
     let create = move |cc: &eframe::CreationContext| {

@@ -19,8 +19,10 @@ pub struct Settings {
     pub theme: Theme,
     /// Size of everything relative to the system's.
     pub scale: f32,
-    /// Inner size of the window, points.
-    pub window_size: [f32; 2],
+    /// Inner size of the window when it is not maximised, logical pixels of the system; `None` until there was one.
+    pub window_size: Option<[f32; 2]>,
+    /// Whether it was maximised.
+    pub maximized: bool,
     /// Which room was open.
     pub room: crate::rooms::Room,
     /// What was written for the last scan.
@@ -58,7 +60,8 @@ impl Default for Settings {
             home: home().join("Weavelight"),
             theme: Theme::default(),
             scale: 1.0,
-            window_size: [1280.0, 800.0],
+            window_size: None,
+            maximized: false,
             room: crate::rooms::Room::Scan,
             scan: Default::default(),
             solve: SolveSettings::default(),
@@ -91,6 +94,9 @@ impl Settings {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             _ => settings.put_aside = put_aside(file),
         }
+        // Nothing could be read in a window of any other scale.
+        settings.scale =
+            if settings.scale.is_finite() { settings.scale.clamp(0.5, 3.0) } else { 1.0 };
         settings.file = Some(file.to_owned());
         settings
     }
@@ -164,6 +170,22 @@ mod tests {
         settings.solve.method = MethodName::Robust;
         settings.save().unwrap();
         assert_eq!(Settings::load_from(&file), settings);
+    }
+
+    #[test]
+    fn a_scale_that_nobody_could_read_is_not_believed() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        let check = |text: &str, expected: f32| {
+            std::fs::write(&file, format!("scale = {text}")).unwrap();
+            assert_eq!(Settings::load_from(&file).scale, expected, "{text}");
+        };
+        check("1.25", 1.25);
+        check("0.0", 0.5);
+        check("-2.0", 0.5);
+        check("inf", 1.0);
+        check("nan", 1.0);
+        check("1e9", 3.0);
     }
 
     #[test]

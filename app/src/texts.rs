@@ -1,6 +1,7 @@
 //! Every word that the window says, by room; what goes wrong is told in the library's own words.
 
 pub mod calibrate;
+pub mod shell;
 
 /// The window's title.
 pub const TITLE: &str = "Weavelight";
@@ -40,8 +41,8 @@ pub const KEYS: [(&str, &str); 9] = [
     ("Delete    ", "move it to the bin"),
     ("Ctrl+Z    ", "undo"),
     ("Ctrl+1…5  ", "open a room"),
-    ("Esc       ", "end what is going on"),
-    ("Ctrl+Q    ", "leave"),
+    ("Esc       ", "leave a field or menu; stop the work"),
+    ("Ctrl+Q    ", "quit"),
 ];
 
 /// Where the settings could not be read.
@@ -90,6 +91,8 @@ pub mod welcome {
     pub const OPEN_WHAT: &str = "The folder that holds rig.toml; or drag it into this window.";
     /// The path's field.
     pub const PATH: &str = "Folder of the rig";
+    /// Its button.
+    pub const OPEN_IT: &str = "Open";
     /// Name of the simulated rig's folder.
     pub const SIMULATED: &str = "simulated rig";
 }
@@ -269,6 +272,10 @@ pub mod scan {
     pub const BUSY: &str = "Something else is going on; see below";
     /// Why it is grey.
     pub const TAKEN: &str = "A scan of this name is there already; choose another name";
+    /// Why it is grey.
+    pub const UNREAD: &str = "A number above cannot be read; correct it first";
+    /// Of a thickness.
+    pub const NOT_MEASURED: &str = "not measured";
     /// While it runs.
     pub const PAUSE: &str = "Pause";
     /// While it rests.
@@ -333,11 +340,6 @@ pub mod scan {
     pub const TO_CALIBRATE: &str = "Go and check it";
     /// The way out.
     pub const CALIBRATE: &str = "Calibrate it";
-
-    /// A swatch's thickness; 0 where nobody measured it.
-    pub fn thickness(mm: f64) -> String {
-        if mm > 0.0 { format!("{mm:.2} mm") } else { "not measured".to_owned() }
-    }
 
     /// Work.
     pub fn scanning(name: &str) -> String {
@@ -472,7 +474,7 @@ pub mod scans {
 
     /// Beside the gallery.
     pub fn details(entry: &Entry) -> Vec<(&'static str, String)> {
-        let captured = entry.captured.map(|when| when.strftime("%Y-%m-%d %H:%M UTC").to_string());
+        let captured = entry.captured.map(crate::clock::local);
         vec![
             ("Taken", captured.unwrap_or_else(|| "unknown".to_owned())),
             ("State", state(entry)),

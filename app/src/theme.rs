@@ -32,6 +32,14 @@ pub const WIDE_GAP: f32 = 16.0;
 /// Side of a big button, points.
 pub const BIG: f32 = 44.0;
 
+/// The ring around what has the keyboard: three to one and more against every ground of its theme.
+pub fn focus(theme: egui::Theme) -> Color32 {
+    match theme {
+        egui::Theme::Dark => meaning::LIT,
+        egui::Theme::Light => Color32::from_rgb(0x00, 0x3E, 0x73),
+    }
+}
+
 /// Sets style, theme and scale.
 pub fn apply(ctx: &egui::Context, settings: &Settings) {
     ctx.set_theme(match settings.theme {
@@ -54,6 +62,8 @@ fn spacing(style: &mut egui::Style) {
     style.spacing.item_spacing = Vec2::splat(GAP);
     style.spacing.button_padding = Vec2::new(12.0, 6.0);
     style.spacing.interact_size.y = 28.0;
+    // A list shows what it has; where the window has no room for that, it scrolls.
+    style.spacing.combo_height = 380.0;
     style.spacing.window_margin = Margin::same(16);
     style.text_styles.insert(TextStyle::Heading, FontId::proportional(20.0));
     style.text_styles.insert(TextStyle::Body, FontId::proportional(14.0));

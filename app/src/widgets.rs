@@ -1,8 +1,9 @@
 //! Small things that several rooms draw.
 
-use crate::desk::{Activity, Problem, Severity};
+use crate::desk::Activity;
 use crate::texts;
 use crate::theme::meaning;
+use eframe::egui::containers::menu::{MenuButton, MenuConfig};
 use eframe::egui::{self, Color32, RichText, vec2};
 
 /// A room's heading with a sentence below.
@@ -37,6 +38,39 @@ pub fn empty(ui: &mut egui::Ui, what: &str, remedy: &str) -> bool {
         primary(ui, remedy, vec2(220.0, crate::theme::BIG), true).clicked()
     })
     .inner
+}
+
+/// A button with a menu below that holds more than commands: it stays until it is closed, or a click goes elsewhere.
+pub fn menu<R>(
+    ui: &mut egui::Ui,
+    text: &str,
+    contents: impl FnOnce(&mut egui::Ui) -> R,
+) -> egui::Response {
+    let stays = MenuConfig::new().close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+    MenuButton::new(text).config(stays).ui(ui, contents).0
+}
+
+/// Whether a key went down: once, however long it is held.
+pub fn struck(ui: &egui::Ui, wanted: egui::Key) -> bool {
+    let is_it = |event: &egui::Event| matches!(event, egui::Event::Key { key, pressed: true, repeat: false, .. } if *key == wanted);
+    ui.input(|input| input.events.iter().any(is_it))
+}
+
+/// Whether Enter was pressed in a field of one line.
+pub fn entered(ui: &egui::Ui, field: &egui::Response) -> bool {
+    field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
+}
+
+/// Draws a ring around what has the keyboard, whatever that is.
+pub fn show_focus(ctx: &egui::Context) {
+    let focused = ctx.memory(|memory| memory.focused());
+    let Some(response) = focused.and_then(|id| ctx.read_response(id)) else { return };
+    let ring = response.rect.expand(2.0);
+    // What is scrolled out of sight has none.
+    let seen = response.interact_rect.expand(4.0);
+    let color = crate::theme::focus(ctx.theme());
+    let painter = ctx.layer_painter(response.layer_id).with_clip_rect(seen);
+    painter.rect_stroke(ring, 6.0, egui::Stroke::new(2.0, color), egui::StrokeKind::Middle);
 }
 
 /// How far work is, with time left and the button that ends it. True when that is clicked.
@@ -109,26 +143,4 @@ impl Sign {
         let (rect, _) = ui.allocate_exact_size(egui::Vec2::splat(18.0), egui::Sense::hover());
         self.paint(ui.painter(), rect.center(), 7.0);
     }
-}
-
-/// A problem with its remedy. True when it is put away.
-pub fn problem(ui: &mut egui::Ui, problem: &Problem) -> bool {
-    let sign = match problem.severity {
-        Severity::Error => Sign::Bad,
-        Severity::Warning => Sign::Warning,
-    };
-    ui.horizontal_top(|ui| {
-        sign.ui(ui);
-        ui.vertical(|ui| {
-            let title = match problem.severity {
-                Severity::Error => format!("{} {}", problem.title, texts::FAILED),
-                Severity::Warning => problem.title.clone(),
-            };
-            ui.label(RichText::new(title).strong());
-            ui.add(egui::Label::new(&problem.text).wrap().selectable(true));
-            ui.small_button(texts::DISMISS).clicked()
-        })
-        .inner
-    })
-    .inner
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot set its table up has failed")]
 
 mod desk;
+mod shell;
 mod wizard;
 
 use desk::{Window, both_themes};

@@ -4,9 +4,8 @@ use crate::browse::Browse;
 use crate::desk::Desk;
 use crate::texts::welcome as texts;
 use crate::worker::Command;
-use crate::{theme, widgets};
+use crate::{paths, theme, widgets};
 use eframe::egui::{self, RichText};
-use std::path::PathBuf;
 
 /// Of the two cards, points.
 const WIDTH: f32 = 560.0;
@@ -52,14 +51,16 @@ impl Welcome {
             let label = ui.label(texts::PATH);
             let width = ui.available_width() - 190.0;
             let field = egui::TextEdit::singleline(&mut self.path).desired_width(width.max(80.0));
-            let entered = ui.add(field).labelled_by(label.id).lost_focus()
-                && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            let field = ui.add(field).labelled_by(label.id);
+            let entered = widgets::entered(ui, &field);
             if let Some(folder) = self.browse.folder(ui) {
                 self.path = folder.display().to_string();
             }
-            let named = !self.path.trim().is_empty();
-            if ui.add_enabled(named, egui::Button::new("Open")).clicked() || (entered && named) {
-                desk.ask(Command::Open(PathBuf::from(self.path.trim())));
+            let folder = paths::typed(&self.path);
+            let open = egui::Button::new(texts::OPEN_IT);
+            let clicked = ui.add_enabled(folder.is_some(), open).clicked();
+            if let Some(folder) = folder.filter(|_| clicked || entered) {
+                desk.ask(Command::Open(folder));
             }
         });
     }

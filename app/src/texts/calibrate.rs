@@ -69,8 +69,6 @@ pub const LAST: &str = "The last picture:";
 pub const NEVER: &str = "Not calibrated yet.";
 /// The limit of age.
 pub const EXPIRES: &str = "Counts as old after";
-/// Its unit.
-pub const DAYS: &str = " days";
 /// The heading of earlier calibrations and pictures.
 pub const HISTORY: &str = "History";
 /// While things are put there.
@@ -405,15 +403,12 @@ pub fn kept(name: &str) -> String {
     )
 }
 
-/// An entry of the history: its stamp, `2026-11-22T1648`, as people write it.
+/// An entry of the history: its stamp, `2026-11-22T1648` in UTC, as the clock on the wall had it.
 pub fn entry(entry: &Entry) -> String {
     let stamp = &entry.stamp;
-    let when = match stamp.split_once('T') {
-        Some((day, time)) if time.len() >= 4 && time.is_char_boundary(2) => {
-            format!("{day} {}:{} UTC", &time[..2], &time[2..])
-        }
-        _ => stamp.clone(),
-    };
+    let when = jiff::civil::DateTime::strptime("%Y-%m-%dT%H%M", stamp)
+        .and_then(|when| when.to_zoned(jiff::tz::TimeZone::UTC))
+        .map_or_else(|_| stamp.clone(), |when| crate::clock::local(when.timestamp()));
     match entry.kept {
         Kept::Calibration => when,
         Kept::Pictures(of) => format!("{}: pictures only\n{when}", step(of)),

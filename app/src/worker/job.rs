@@ -1,7 +1,7 @@
 //! One piece of work: told about, and ended when nobody wants it any more.
 
 use super::Update;
-use crate::desk::Problem;
+use crate::desk::{Area, Problem};
 use eframe::egui;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,6 +17,7 @@ pub struct Brake(Arc<State>);
 #[derive(Debug, Default)]
 struct State {
     cancelled: AtomicBool,
+    closing: AtomicBool,
     scan: Mutex<Option<Control>>,
 }
 
@@ -43,6 +44,22 @@ impl Brake {
         }
     }
 
+    /// Ends the work under way, and begins no other.
+    pub fn close(&self) {
+        self.0.closing.store(true, Ordering::SeqCst);
+        self.cancel();
+    }
+
+    /// Whether frames are being taken.
+    pub fn is_capturing(&self) -> bool {
+        self.0.scan.lock().is_ok_and(|scan| scan.is_some())
+    }
+
+    /// Whether no work is to begin any more.
+    pub(super) fn is_closing(&self) -> bool {
+        self.0.closing.load(Ordering::SeqCst)
+    }
+
     /// Whether the work under way is no longer wanted.
     pub(super) fn is_cancelled(&self) -> bool {
         self.0.cancelled.load(Ordering::SeqCst)
@@ -67,16 +84,23 @@ pub struct Outbox {
     updates: Sender<Update>,
     ctx: egui::Context,
     brake: Brake,
+    /// What problems belong to.
+    area: Option<Area>,
 }
 
 impl Outbox {
     pub(super) fn new(updates: Sender<Update>, ctx: egui::Context, brake: Brake) -> Self {
-        Self { updates, ctx, brake }
+        Self { updates, ctx, brake, area: None }
+    }
+
+    /// The same, for work of an area.
+    pub(super) fn of(&self, area: Area) -> Self {
+        Self { area: Some(area), ..self.clone() }
     }
 
     /// A new command: what ended the last one does not count for it.
     pub(super) fn begin(&self) {
-        self.brake.0.cancelled.store(false, Ordering::SeqCst);
+        self.brake.0.cancelled.store(self.brake.is_closing(), Ordering::SeqCst);
     }
 
     /// Tells the window.
@@ -93,6 +117,11 @@ impl Outbox {
         self.progress(share, step, None);
     }
 
+    /// Whether no command is to begin any more.
+    pub(super) fn is_closing(&self) -> bool {
+        self.brake.is_closing()
+    }
+
     /// Whether the command under way is no longer wanted.
     pub fn is_cancelled(&self) -> bool {
         self.brake.is_cancelled()
@@ -106,13 +135,17 @@ impl Outbox {
     /// Puts up a warning for each sentence.
     pub fn warn(&self, title: &str, sentences: &[String]) {
         for text in sentences {
-            self.tell(Update::Problem(Problem::warning(title, text)));
+            self.put_up(Problem::warning(title, text));
         }
     }
 
     /// Puts up an error.
     pub fn fail(&self, title: &str, error: &dyn std::fmt::Display) {
-        self.tell(Update::Problem(Problem::error(title, error.to_string())));
+        self.put_up(Problem::error(title, error.to_string()));
+    }
+
+    fn put_up(&self, problem: Problem) {
+        self.tell(Update::Problem(Problem { area: self.area, ..problem }));
     }
 
     /// Work that takes its time: told when it begins and ends, with its error put up, and ended where [`Outbox::tick`] finds

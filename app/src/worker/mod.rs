@@ -10,7 +10,7 @@ pub mod open;
 
 pub use job::{Ended, Outbox};
 
-use crate::desk::Problem;
+use crate::desk::{Area, Problem};
 use crate::place::Place;
 use crate::rooms::{Room, calibrate, look, rig, scan, scans};
 use eframe::egui;
@@ -43,6 +43,38 @@ pub enum Command {
 }
 
 impl Command {
+    /// What it belongs to.
+    fn area(&self) -> Area {
+        match self {
+            Command::Open(_) | Command::Dropped(_) | Command::MakeSimulatedRig(_) => Area::Opening,
+            Command::Rig(_) => Area::Rig,
+            Command::Calibrate(_) => Area::Calibrate,
+            Command::Scan(_) => Area::Scan,
+            Command::Look(_) => Area::Look,
+            Command::Scans(_) => Area::Scans,
+        }
+    }
+
+    /// Of which area it is a new try; `None` for what the program asks by itself.
+    pub fn tries(&self) -> Option<Area> {
+        let by_the_user = match self {
+            Command::Open(_) | Command::Dropped(_) | Command::MakeSimulatedRig(_) => true,
+            Command::Rig(ask) => {
+                !matches!(ask, rig::Ask::ReadCalibration(_) | rig::Ask::Light(None))
+            }
+            Command::Calibrate(ask) => {
+                !matches!(ask, calibrate::Ask::Refresh | calibrate::Ask::Look(..))
+            }
+            Command::Scan(ask) => !matches!(ask, scan::Ask::LookForUnfinished),
+            Command::Look(ask) => {
+                use look::Ask;
+                matches!(ask, Ask::Open(_) | Ask::Compare(..) | Ask::Mask(..) | Ask::Solve(..))
+            }
+            Command::Scans(ask) => !matches!(ask, scans::Ask::List(_) | scans::Ask::Thumbnail(..)),
+        };
+        by_the_user.then(|| self.area())
+    }
+
     /// Whether it needs neither devices nor the solver, and says itself of which rig it is.
     fn only_reads(&self) -> bool {
         match self {
@@ -137,8 +169,10 @@ impl Worker {
         std::thread::spawn(move || {
             let mut tools = Tools::default();
             for command in inbox {
-                out.begin();
-                act(command, &mut tools, &out);
+                if !out.is_closing() {
+                    out.begin();
+                    act(command, &mut tools, &out);
+                }
                 done.fetch_sub(1, Ordering::SeqCst);
             }
         });
@@ -165,6 +199,7 @@ impl Worker {
 }
 
 fn act(command: Command, tools: &mut Tools, out: &Outbox) {
+    let out = &out.of(command.area());
     match command {
         Command::Open(folder) => open::open(&folder, tools, out),
         Command::Dropped(path) => open::dropped(path, tools, out),

@@ -46,6 +46,135 @@ fn a_lamp_is_dragged_over_the_cloth() {
     assert!(back[0] > back[1] && back[0] > there[0], "and back at the first: {back:?}");
 }
 
+/// The lamp is drawn where the hand is in the same frame, and its last move counts, even where it comes with the release.
+#[test]
+fn the_lamp_is_where_the_hand_is() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    // The panel beside them is drawn before the maps.
+    let maps = |window: &mut bench::Window| {
+        image::imageops::crop_imm(&window.render().unwrap(), 0, 100, 960, 620).to_image()
+    };
+    window.drag_at(CLOTH[0]);
+    window.step();
+    for share in [0.3, 0.7, 1.0] {
+        window.hover_at(CLOTH[0] + share * (CLOTH[1] - CLOTH[0]));
+        window.step();
+    }
+    let at_once = maps(&mut window);
+    window.run();
+    assert!(at_once == maps(&mut window), "the lamp lags behind the hand");
+    window.drop_at(CLOTH[1]);
+    window.run();
+    window.remove_cursor();
+    window.run();
+    let dropped = maps(&mut window);
+    // The same, with the last move in the frame of the release.
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    window.drag_at(CLOTH[0]);
+    window.step();
+    window.hover_at(CLOTH[0] + egui::vec2(20.0, 20.0));
+    window.step();
+    window.input_mut().events.extend([
+        egui::Event::PointerMoved(CLOTH[1]),
+        egui::Event::PointerButton {
+            pos: CLOTH[1],
+            button: egui::PointerButton::Primary,
+            pressed: false,
+            modifiers: Modifiers::NONE,
+        },
+    ]);
+    window.run();
+    window.remove_cursor();
+    window.run();
+    assert!(maps(&mut window) == dropped, "its last move is lost");
+}
+
+/// Where a frame takes long - in a test, each takes a quarter of a second - the cloth is drawn coarsely while the light is
+/// dragged, much the same but for its finest detail, and finely as soon as it is let go.
+#[test]
+fn slow_frames_are_coarse_until_the_light_is_let_go() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    bench::drag(&mut window, [CLOTH[1], CLOTH[0]]);
+    window.drag_at(CLOTH[0]);
+    window.step();
+    for k in 0..4 {
+        window.hover_at(CLOTH[0] + egui::vec2(10.0 * k as f32, 10.0));
+        window.step();
+    }
+    window.run();
+    let coarse = window.render().unwrap();
+    window.drop_at(CLOTH[0] + egui::vec2(30.0, 10.0));
+    window.run();
+    let fine = window.render().unwrap();
+    let cloth = |picture: &image::RgbaImage| {
+        let part = image::imageops::crop_imm(picture, 420, 320, 200, 160).to_image();
+        part.pixels().map(|pixel| i32::from(pixel[1])).collect::<Vec<_>>()
+    };
+    let apart: Vec<i32> =
+        cloth(&coarse).iter().zip(cloth(&fine)).map(|(a, b)| (a - b).abs()).collect();
+    let mean = f64::from(apart.iter().sum::<i32>()) / apart.len() as f64;
+    assert!(apart.iter().any(|apart| *apart > 0), "it was fine all the time");
+    assert!(mean < 12.0, "{mean} grey values apart");
+}
+
+/// Both menus stay open while a path is written into their field with the mouse and the keys.
+#[test]
+fn the_menus_with_a_path_stay_open() {
+    let bench = Bench::new();
+    let mut window = bench.look(SIZE, egui::Theme::Dark);
+    let other = bench.solve_again("plain", weavelight::photometry::Method::LeastSquares);
+    for (menu, there) in [("Compare with…", "Against plain"), ("Open…", "plain")] {
+        window.get_by_label(menu).click();
+        window.run();
+        let role = egui::accesskit::Role::TextInput;
+        let field = |window: &bench::Window| {
+            window.query_by_role_and_label(role, "Folder of the solution").is_some()
+        };
+        window.get_by_role_and_label(role, "Folder of the solution").click();
+        window.run();
+        window.get_by_role_and_label(role, "Folder of the solution").click();
+        window.run();
+        assert!(field(&window), "{menu} has closed at a click");
+        window.event(egui::Event::Paste(other.display().to_string()));
+        window.run();
+        window.key_press(Key::Enter);
+        bench::wait(&mut window, "what was asked for", |window| {
+            window.query_by_label(there).is_some()
+        });
+        window.run();
+        assert!(!field(&window), "{menu} closes when it is done");
+    }
+    // The keyboard is in the field as soon as it is there; Escape and a click elsewhere close it.
+    for way_out in [true, false] {
+        window.get_by_label("Open…").click();
+        window.run();
+        window.event(egui::Event::Text("/tmp/x".to_owned()));
+        window.run();
+        assert!(window.query_all_by_value("/tmp/x").next().is_some(), "the keyboard is elsewhere");
+        if way_out {
+            window.key_press(Key::Escape);
+            window.run();
+            window.key_press(Key::Escape);
+        } else {
+            window.drag_at(CLOTH[0]);
+            window.drop_at(CLOTH[0]);
+        }
+        window.run();
+        assert!(window.query_by_label("Folder of the solution").is_none());
+        window.get_by_label("Open…").click();
+        window.run();
+        window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        window.key_press(Key::Backspace);
+        window.run();
+        window.key_press(Key::Escape);
+        window.run();
+        window.key_press(Key::Escape);
+        window.run();
+    }
+}
+
 #[test]
 fn a_photosite_says_which_lights_it_rests_on() {
     let bench = Bench::new();

@@ -198,11 +198,12 @@ impl Calibrate {
             view::no_chessboards(ui);
             return false;
         }
+        let mut is_read = true;
         if !simulated {
             let targets = &mut desk.settings.targets;
-            view::targets(ui, task, targets, &mut self.browse, desk.place.as_ref());
+            is_read = view::targets(ui, task, targets, &mut self.browse, desk.place.as_ref());
         }
-        self.buttons(ui, task, simulated, desk);
+        ui.add_enabled_ui(is_read, |ui| self.buttons(ui, task, simulated, desk));
         ui.add_space(theme::GAP);
         true
     }
@@ -216,8 +217,8 @@ impl Calibrate {
             // While it looks, the picture that is wanted comes right after.
             let free_to_go = !busy || (self.live.on && !self.live.taking);
             let clicked = widgets::primary(ui, text, size, free_to_go).clicked();
-            let free = !ui.ctx().egui_wants_keyboard_input();
-            let space = free && ui.input(|input| input.key_pressed(egui::Key::Space));
+            let free = ui.is_enabled() && !ui.ctx().egui_wants_keyboard_input();
+            let space = free && widgets::struck(ui, egui::Key::Space);
             if (clicked || space) && free_to_go {
                 self.go(task, desk);
             }

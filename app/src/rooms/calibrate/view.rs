@@ -4,10 +4,12 @@ use super::history::Entry;
 use super::picture::{Picture, paint_earlier};
 use super::task::{State, Step, TargetSettings, Task};
 use crate::browse::Browse;
+use crate::number::{Number, Unit};
 use crate::place::Place;
 use crate::texts::calibrate as texts;
 use crate::theme::{self, meaning};
 use crate::widgets::Sign;
+use eframe::egui::emath::Numeric;
 use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
 use std::path::Path;
 use weavelight::calibrate::{Action, StepState};
@@ -230,20 +232,20 @@ pub(super) fn no_chessboards(ui: &mut egui::Ui) {
     });
 }
 
-/// What the technician says of the target in hand.
+/// What the technician says of the target in hand. Whether every number can be read.
 pub(super) fn targets(
     ui: &mut egui::Ui,
     task: Task,
     targets: &mut TargetSettings,
     browse: &mut Browse,
     place: Option<&Place>,
-) {
+) -> bool {
     let last_light = place.map_or(0, |place| place.rig.lights.len().saturating_sub(1));
-    ui.horizontal_wrapped(|ui| match task {
+    let row = ui.horizontal_wrapped(|ui| match task {
         Task::Table | Task::Board => {
-            shape(ui, texts::BOARD, &mut targets.board, &mut targets.board_square_mm);
-            let value = egui::DragValue::new(&mut targets.board_light).range(0..=last_light);
-            field(ui, texts::LIGHT, value);
+            let light = Number::of(Unit::Count, 0.0..=last_light as f64);
+            let board = shape(ui, texts::BOARD, &mut targets.board, &mut targets.board_square_mm);
+            field(ui, texts::LIGHT, &light, &mut targets.board_light) && board
         }
         Task::Chart => {
             let label = ui.label(texts::CHART);
@@ -252,36 +254,45 @@ pub(super) fn targets(
             if let Some(file) = browse.file(ui) {
                 targets.chart = file.display().to_string();
             }
+            true
         }
         Task::Sheet(pose) => {
-            let value = egui::DragValue::new(&mut targets.reflectance).range(0.1..=1.0);
-            field(ui, texts::REFLECTANCE, value.speed(0.005).max_decimals(3));
-            match pose {
-                super::Pose::Flat => {}
-                super::Pose::Raised => {
-                    let value = egui::DragValue::new(&mut targets.raised_mm).range(1.0..=300.0);
-                    field(ui, texts::RAISED, value.suffix(" mm"));
+            let share = Number::of(Unit::Share, 0.1..=1.0).speed(0.005);
+            let reflectance = field(ui, texts::REFLECTANCE, &share, &mut targets.reflectance);
+            let height = Number::of(Unit::Millimetres, 1.0..=300.0);
+            reflectance
+                && match pose {
+                    super::Pose::Flat => true,
+                    super::Pose::Raised => {
+                        field(ui, texts::RAISED, &height, &mut targets.raised_mm)
+                    }
+                    _ => shape(ui, texts::STRIP, &mut targets.strip, &mut targets.strip_square_mm),
                 }
-                _ => shape(ui, texts::STRIP, &mut targets.strip, &mut targets.strip_square_mm),
-            }
         }
-        Task::Fit(_) | Task::Done => {}
+        Task::Fit(_) | Task::Done => true,
     });
+    row.inner
 }
 
-fn shape(ui: &mut egui::Ui, text: &str, [columns, rows]: &mut [usize; 2], square_mm: &mut f64) {
-    let label = ui.label(text);
-    ui.add(egui::DragValue::new(columns).range(2..=99)).labelled_by(label.id);
-    let by = ui.label("×");
-    ui.add(egui::DragValue::new(rows).range(2..=99)).labelled_by(by.id);
-    let of = ui.label(texts::SQUARES);
-    let value = egui::DragValue::new(square_mm).range(0.5..=200.0).speed(0.1).suffix(" mm");
-    ui.add(value).labelled_by(of.id);
+fn shape(
+    ui: &mut egui::Ui,
+    text: &str,
+    [columns, rows]: &mut [usize; 2],
+    square_mm: &mut f64,
+) -> bool {
+    let count = Number::of(Unit::Count, 2.0..=99.0);
+    let columns = field(ui, text, &count, columns);
+    let rows = field(ui, "×", &count, rows);
+    let side = Number::of(Unit::Millimetres, 0.5..=200.0);
+    field(ui, texts::SQUARES, &side, square_mm) && columns && rows
 }
 
-fn field(ui: &mut egui::Ui, text: &str, value: egui::DragValue<'_>) {
+/// A number with its name. Whether it can be read.
+fn field<N: Numeric>(ui: &mut egui::Ui, text: &str, number: &Number, value: &mut N) -> bool {
     let label = ui.label(text);
-    ui.add(value).labelled_by(label.id);
+    let field = number.show(ui, text, value);
+    field.response.labelled_by(label.id);
+    field.is_read
 }
 
 /// How old it is, and from when on that counts.
@@ -303,8 +314,8 @@ pub(super) fn age(ui: &mut egui::Ui, state: &State, targets: &mut TargetSettings
         }
     }
     ui.horizontal(|ui| {
-        let value = egui::DragValue::new(&mut targets.expires_after_days).range(1..=3650);
-        field(ui, texts::EXPIRES, value.suffix(texts::DAYS));
+        let days = Number::of(Unit::Days, 1.0..=3650.0).speed(1.0);
+        field(ui, texts::EXPIRES, &days, &mut targets.expires_after_days);
     });
 }
 

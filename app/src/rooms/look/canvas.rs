@@ -53,17 +53,20 @@ impl Look {
         if self.lamp.moves && self.lamp.kind == Kind::Sun {
             ui.ctx().request_repaint();
         }
-        let appearance = self.appearance();
         let drag_pans = self.tool == Tool::Hand && !self.light_is_in_hand();
-        let canvas =
-            view::Canvas { maps: &maps, appearance: &appearance, name: texts::MAPS, drag_pans };
-        let shown = self.view.show(ui, &canvas);
+        let shown = self.view.begin(ui, &maps, (texts::MAPS, drag_pans));
         self.hovered(&shown, maps.size());
         match self.tool {
             Tool::Hand => self.hand(ui, &shown, &maps.geometry, desk),
             Tool::Line => self.draw_line(&shown),
             Tool::Brush | Tool::Lasso => self.paint(&shown, maps.size()),
         }
+        self.move_divider(ui, &shown);
+        // Only now the light is where the hand is.
+        let appearance = self.appearance();
+        let canvas =
+            view::Canvas { maps: &maps, appearance: &appearance, name: texts::MAPS, drag_pans };
+        self.view.paint(ui, &shown, &canvas);
         if !view::can_draw(ui.ctx()) {
             // Nothing to draw over.
             return;
@@ -81,14 +84,19 @@ impl Look {
 
     fn hovered(&mut self, shown: &Shown, size: [usize; 2]) {
         let under = shown.response.hover_pos().map(|at| shown.viewport.pixel_at(at, shown.rect));
-        self.canvas.hovered = under.and_then(|at| inside(at, size));
+        let hovered = under.and_then(|at| inside(at, size));
+        if hovered != self.canvas.hovered {
+            // Its numbers were drawn before.
+            shown.response.ctx.request_repaint();
+        }
+        self.canvas.hovered = hovered;
     }
 
     /// Moves the light; a click takes a photosite.
     fn hand(&mut self, ui: &Ui, shown: &Shown, geometry: &Geometry, desk: &mut Desk) {
         let response = &shown.response;
         if self.light_is_in_hand() {
-            if response.dragged_by(egui::PointerButton::Primary)
+            if is_dragged(response)
                 && let Some(at) = response.interact_pointer_pos()
             {
                 self.carry_light(at, shown, geometry);
@@ -145,7 +153,7 @@ impl Look {
             });
             self.set_line(Some([start, at]));
         }
-        if response.dragged_by(egui::PointerButton::Primary)
+        if is_dragged(response)
             && let Some(line) = &mut self.line
         {
             line[1] = at;
@@ -305,15 +313,14 @@ impl Look {
         ui.painter().rect_stroke(rect.expand(1.0), 1.0, Stroke::new(1.5, meaning::LIT), outside);
     }
 
-    /// The line between two sides.
-    fn divider(&mut self, ui: &mut Ui, shown: &Shown) {
+    /// The line between two sides is dragged.
+    fn move_divider(&mut self, ui: &Ui, shown: &Shown) {
         if self.layers.compose != Compose::Split {
             return;
         }
-        let x = shown.rect.left() + self.layers.divider * shown.rect.width();
-        let (top, bottom) = (pos2(x, shown.rect.top()), pos2(x, shown.rect.bottom()));
+        let [top, bottom] = self.divider_ends(shown);
         let grip = Rect::from_two_pos(top, bottom).expand2(vec2(6.0, 0.0));
-        let response = ui.interact(grip, ui.make_persistent_id("divider"), Sense::drag());
+        let response = ui.interact(grip, egui::Id::unique("divider"), Sense::DRAG);
         let share = f64::from(self.layers.divider);
         response.widget_info(|| WidgetInfo::slider(true, share, texts::DIVIDER));
         if response.dragged() {
@@ -323,8 +330,21 @@ impl Look {
         if response.hovered() || response.dragged() {
             ui.ctx().set_cursor_icon(CursorIcon::ResizeHorizontal);
         }
-        line(ui.painter(), [top, bottom], Color32::WHITE);
-        let knob = pos2(x, shown.rect.center().y);
+    }
+
+    fn divider_ends(&self, shown: &Shown) -> [Pos2; 2] {
+        let x = shown.rect.left() + self.layers.divider * shown.rect.width();
+        [pos2(x, shown.rect.top()), pos2(x, shown.rect.bottom())]
+    }
+
+    /// The line between two sides.
+    fn divider(&self, ui: &Ui, shown: &Shown) {
+        if self.layers.compose != Compose::Split {
+            return;
+        }
+        let ends = self.divider_ends(shown);
+        line(ui.painter(), ends, Color32::WHITE);
+        let knob = pos2(ends[0].x, shown.rect.center().y);
         ui.painter().circle_filled(knob, 8.0, Color32::WHITE);
         ui.painter().circle_stroke(knob, 8.0, Stroke::new(2.0, Color32::from_black_alpha(160)));
     }
@@ -363,6 +383,12 @@ impl Canvas {
     pub(super) fn radius_px(&self, size: [usize; 2]) -> f64 {
         if self.brush_px > 0.0 { self.brush_px } else { (size[0] as f64 / 50.0).max(1.0) }
     }
+}
+
+/// Whether the first button drags, or has just let go: where it did so is the last place of the drag.
+fn is_dragged(response: &egui::Response) -> bool {
+    let button = egui::PointerButton::Primary;
+    response.dragged_by(button) || response.drag_stopped_by(button)
 }
 
 /// The pixel at pixel coordinates.

@@ -33,7 +33,7 @@ use crate::rooms::Room;
 use crate::settings::SolveSettings;
 use crate::texts::look as texts;
 use crate::worker::{Command, Outbox, Tools};
-use crate::{theme, widgets};
+use crate::{paths, theme, widgets};
 use edits::Edits;
 use eframe::egui::{self, RichText};
 use lamp::Lamp;
@@ -139,6 +139,8 @@ pub struct Look {
     painting: Option<Painting>,
     edits: Edits,
     path: String,
+    /// A path is to be written next.
+    path_is_next: bool,
     browse: Browse,
 }
 
@@ -288,13 +290,18 @@ impl Look {
             let label = ui.label(name);
             let width = (ui.available_width() - 160.0).max(60.0);
             let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
-            ui.add(field).labelled_by(label.id);
+            let field = ui.add(field).labelled_by(label.id);
+            if std::mem::take(&mut self.path_is_next) {
+                field.request_focus();
+            }
+            let entered = widgets::entered(ui, &field);
             if let Some(folder) = self.browse.folder(ui) {
                 self.path = folder.display().to_string();
             }
-            let named = !self.path.trim().is_empty();
-            if ui.add_enabled(named, egui::Button::new(action)).clicked() {
-                open(PathBuf::from(self.path.trim()));
+            let folder = paths::typed(&self.path);
+            let clicked = ui.add_enabled(folder.is_some(), egui::Button::new(action)).clicked();
+            if let Some(folder) = folder.filter(|_| clicked || entered) {
+                open(folder);
                 ui.close();
             }
         });
@@ -331,18 +338,23 @@ impl Look {
             ui.add(egui::Label::new(RichText::new(name).heading()).truncate());
             ui.label(RichText::new(about).weak()).on_hover_text(&warnings);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                ui.menu_button(texts::OPEN_MENU, |ui| {
-                    ui.set_min_width(460.0);
+                let open = widgets::menu(ui, texts::OPEN_MENU, |ui| {
+                    ui.set_min_width(menu_width(ui));
                     self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
                         desk.ask(Command::Look(Ask::Open(folder)));
                     });
                 });
-                ui.menu_button(texts::COMPARE_MENU, |ui| {
-                    ui.set_min_width(460.0);
+                let compare = widgets::menu(ui, texts::COMPARE_MENU, |ui| {
+                    ui.set_min_width(menu_width(ui));
                     self.path_field(ui, texts::FOLDER, texts::COMPARE, |folder| {
                         desk.ask(Command::Look(Ask::Compare(folder, surface.clone())));
                     });
                 });
+                // The field is what they are about.
+                if open.clicked() || compare.clicked() {
+                    self.path_is_next = true;
+                    ui.ctx().request_repaint();
+                }
             });
         });
         ui.horizontal(|ui| self.tools(ui));
@@ -409,6 +421,11 @@ impl Look {
             desk.ask(Command::Look(Ask::Residual(sources, light)));
         }
     }
+}
+
+/// Of the menus with a path, points.
+fn menu_width(ui: &egui::Ui) -> f32 {
+    460.0_f32.min(ui.ctx().content_rect().width() - 40.0)
 }
 
 /// Size, scale and method in words.

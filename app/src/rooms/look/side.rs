@@ -5,10 +5,12 @@ use super::layer::Layer;
 use super::view::Compose;
 use super::{Ask, Look, Tool, plots};
 use crate::desk::Desk;
+use crate::number::{Number, Unit};
 use crate::texts::look as texts;
 use crate::widgets::Sign;
 use crate::worker::Command;
-use eframe::egui::{self, Button, ComboBox, Response, RichText, ScrollArea, Slider, Ui, vec2};
+use eframe::egui::emath::Numeric;
+use eframe::egui::{self, Button, ComboBox, RichText, ScrollArea, Slider, Ui, vec2};
 
 /// Width of the panel, points.
 pub(super) const WIDTH: f32 = 296.0;
@@ -71,7 +73,10 @@ impl Look {
     fn layer_choice(&mut self, ui: &mut Ui, k: usize, name: &str) {
         let mut chosen = self.layers.sides[k];
         named(ui, name, |ui, label| {
+            // All maps at once where the window has room for them.
+            let height = 0.6 * ui.ctx().content_rect().height();
             let choice = ComboBox::from_id_salt(("layer", k)).width(ui.available_width());
+            let choice = choice.height(height.min(400.0));
             let shown = choice.selected_text(chosen.name()).show_ui(ui, |ui| {
                 for layer in Layer::ALL {
                     let why_not = self.why_not(layer);
@@ -95,24 +100,19 @@ impl Look {
             [Layer::Error, Layer::Slope, Layer::Angle, Layer::Residual].map(seen);
         let difference = layers.compose == Compose::Difference;
         let scales = &mut self.layers.scales;
-        let degrees = |value, range| Slider::new(value, range).suffix("°");
-        let up_to = texts::UP_TO;
-        if error {
-            slider(ui, up_to, degrees(&mut scales.error_deg, 0.5..=30.0).logarithmic(true));
-        }
-        if slope {
-            slider(ui, up_to, degrees(&mut scales.slope_deg, 5.0..=90.0));
-        }
-        if angle {
-            slider(ui, up_to, degrees(&mut scales.angle_deg, 0.1..=45.0).logarithmic(true));
-        }
-        if residual {
-            let range = 0.002..=0.5;
-            slider(ui, up_to, Slider::new(&mut scales.residual, range).logarithmic(true));
-        }
-        if difference {
-            let range = 0.01..=1.0;
-            slider(ui, up_to, Slider::new(&mut scales.difference, range).logarithmic(true));
+        let degrees = |range| Number::of(Unit::Degrees, range).decimals(0..=2);
+        let share = |range| Number::of(Unit::Share, range).speed(0.005);
+        let rows = [
+            (error, &mut scales.error_deg, degrees(0.5..=30.0), Steps::Logarithmic),
+            (slope, &mut scales.slope_deg, degrees(5.0..=90.0), Steps::Even),
+            (angle, &mut scales.angle_deg, degrees(0.1..=45.0), Steps::Logarithmic),
+            (residual, &mut scales.residual, share(0.002..=0.5), Steps::Logarithmic),
+            (difference, &mut scales.difference, share(0.01..=1.0), Steps::Logarithmic),
+        ];
+        for (seen, value, number, steps) in rows {
+            if seen {
+                slider(ui, texts::UP_TO, value, (number, steps));
+            }
         }
     }
 
@@ -136,11 +136,11 @@ impl Look {
         if of_frames || (relit && self.lamp.kind == Kind::Rig) {
             self.rig_lights(ui);
         }
-        let stops = Slider::new(&mut self.lamp.stops, -4.0..=4.0).suffix(" EV");
-        slider(ui, texts::BRIGHTNESS, stops.fixed_decimals(1));
+        let stops = Number::of(Unit::Stops, -4.0..=4.0).decimals(1..=1);
+        slider(ui, texts::BRIGHTNESS, &mut self.lamp.stops, (stops, Steps::Even));
         if relit {
-            let gloss = Slider::new(&mut self.lamp.gloss, 0.0..=0.2);
-            slider(ui, texts::GLOSS, gloss.fixed_decimals(2));
+            let gloss = Number::of(Unit::Share, 0.0..=0.2).speed(0.002).decimals(2..=2);
+            slider(ui, texts::GLOSS, &mut self.lamp.gloss, (gloss, Steps::Even));
         }
         rule(ui);
     }
@@ -158,16 +158,17 @@ impl Look {
     }
 
     fn lamp_controls(&mut self, ui: &mut Ui) {
-        let height = Slider::new(&mut self.lamp.height_mm, 5.0..=2000.0).logarithmic(true);
-        slider(ui, texts::HEIGHT, height.suffix(" mm").fixed_decimals(0));
+        let height = Number::of(Unit::Millimetres, 5.0..=2000.0).speed(1.0).decimals(0..=0);
+        slider(ui, texts::HEIGHT, &mut self.lamp.height_mm, (height, Steps::Logarithmic));
         ui.label(RichText::new(texts::DRAG_LAMP).weak().small());
     }
 
     fn sun_controls(&mut self, ui: &mut Ui) {
-        let elevation = Slider::new(&mut self.lamp.elevation_deg, 1.0..=90.0).suffix("°");
-        slider(ui, texts::ELEVATION, elevation.fixed_decimals(0));
-        let azimuth = Slider::new(&mut self.lamp.azimuth_deg, 0.0..=360.0).suffix("°");
-        slider(ui, texts::AZIMUTH, azimuth.fixed_decimals(0));
+        let degrees = |range| Number::of(Unit::Degrees, range).speed(0.5).decimals(0..=0);
+        let elevation = (degrees(1.0..=90.0), Steps::Even);
+        slider(ui, texts::ELEVATION, &mut self.lamp.elevation_deg, elevation);
+        let azimuth = (degrees(0.0..=360.0), Steps::Even);
+        slider(ui, texts::AZIMUTH, &mut self.lamp.azimuth_deg, azimuth);
         ui.checkbox(&mut self.lamp.moves, texts::MOVES);
     }
 
@@ -210,8 +211,8 @@ impl Look {
         let size = opened.maps.size();
         let mut radius = self.canvas.radius_px(size);
         let most = (size[0] as f64 / 4.0).max(2.0);
-        let brush = Slider::new(&mut radius, 0.5..=most).logarithmic(true).suffix(" px");
-        if slider(ui, texts::BRUSH, brush.fixed_decimals(0)).changed() {
+        let brush = Number::of(Unit::Pixels, 0.5..=most).decimals(0..=0);
+        if slider(ui, texts::BRUSH, &mut radius, (brush, Steps::Logarithmic)) {
             self.canvas.brush_px = radius;
         }
         let (Some(painting), Some(capture)) = (&mut self.painting, opened.capture()) else {
@@ -273,10 +274,26 @@ fn named<R>(
     .inner
 }
 
-/// A slider with its name and value.
-fn slider(ui: &mut Ui, name: &str, slider: Slider) -> Response {
+/// How a slider goes from one end to the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Steps {
+    Even,
+    Logarithmic,
+}
+
+/// A slider with its name, and its value to be written. True when it was changed.
+fn slider<N: Numeric>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut N,
+    (number, steps): (Number, Steps),
+) -> bool {
     named(ui, name, |ui, label| {
         ui.spacing_mut().slider_width = ui.available_width() - VALUE - ui.spacing().item_spacing.x;
-        ui.add(slider).labelled_by(label)
+        let range = N::from_f64(*number.range().start())..=N::from_f64(*number.range().end());
+        let slider = Slider::new(value, range).show_value(false);
+        let moved = ui.add(slider.logarithmic(steps == Steps::Logarithmic)).labelled_by(label);
+        let written = number.show(ui, name, value).response.labelled_by(label);
+        moved.changed() || written.changed()
     })
 }

@@ -44,7 +44,8 @@ pub(super) fn ui(
     camera_mm: f64,
     lit: Option<usize>,
 ) -> Option<usize> {
-    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    // No stop for the keyboard: it has the table below.
+    let (rect, response) = ui.allocate_exact_size(size, Sense::CLICK);
     let name = texts::side(side == Side::Front);
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, name));
     let map = Map::new(rect, side, lamps, camera_mm);

@@ -2,6 +2,7 @@
 
 use super::{Ask, Order};
 use crate::desk::Desk;
+use crate::number::{Number, Unit};
 use crate::place::Place;
 use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
 use crate::worker::Command;
@@ -48,25 +49,31 @@ impl FormSettings {
         }
     }
 
-    fn numbers(&mut self, ui: &mut egui::Ui) {
+    /// The fields for numbers. Whether all of them can be read.
+    fn numbers(&mut self, ui: &mut egui::Ui) -> bool {
         let label = ui.label(texts::THICKNESS);
-        let thickness = egui::DragValue::new(&mut self.thickness_mm).range(0.0..=100.0).speed(0.05);
-        let read = |text: &str| text.trim().trim_end_matches("mm").trim().parse().ok();
-        let thickness = thickness.custom_formatter(|mm, _| texts::thickness(mm));
-        ui.add(thickness.custom_parser(read)).labelled_by(label.id);
+        let thickness = Number::of(Unit::Millimetres, 0.0..=100.0).speed(0.05).decimals(2..=3);
+        let thickness = thickness.unset(texts::NOT_MEASURED);
+        let thickness = thickness.show(ui, texts::THICKNESS, &mut self.thickness_mm);
+        thickness.response.labelled_by(label.id);
         ui.end_row();
         let label = ui.label(texts::EXPOSURE);
-        ui.horizontal(|ui| {
+        let exposure = ui.horizontal(|ui| {
             ui.checkbox(&mut self.find_exposure, texts::FIND_EXPOSURE);
-            let exposure = egui::DragValue::new(&mut self.exposure_s).range(1e-4..=30.0);
-            let exposure = exposure.speed(0.005).suffix(" s").max_decimals(4);
-            ui.add_enabled(!self.find_exposure, exposure).labelled_by(label.id);
+            let exposure = Number::of(Unit::Seconds, 1e-4..=30.0).speed(0.005).decimals(0..=4);
+            let shown =
+                |ui: &mut egui::Ui| exposure.show(ui, texts::EXPOSURE, &mut self.exposure_s);
+            ui.add_enabled_ui(!self.find_exposure, shown).inner
         });
+        let exposure = exposure.inner;
+        exposure.response.labelled_by(label.id);
         ui.end_row();
         let label = ui.label(texts::ISO);
-        let iso = egui::DragValue::new(&mut self.iso).range(25.0..=25_600.0).speed(10.0);
-        ui.add(iso.max_decimals(0)).labelled_by(label.id);
+        let iso =
+            Number::of(Unit::Iso, 25.0..=25_600.0).speed(10.0).show(ui, texts::ISO, &mut self.iso);
+        iso.response.labelled_by(label.id);
         ui.end_row();
+        thickness.is_read && exposure.is_read && iso.is_read
     }
 }
 
@@ -78,11 +85,13 @@ pub(super) const BUTTON_HEIGHT: f32 = 104.0;
 pub(super) struct Form {
     test_light: usize,
     fabric: Preset,
+    /// A number cannot be read: nothing is scanned with another one in its place.
+    unread: bool,
 }
 
 impl Default for Form {
     fn default() -> Self {
-        Self { test_light: 0, fabric: Preset::Linen }
+        Self { test_light: 0, fabric: Preset::Linen, unread: false }
     }
 }
 
@@ -93,7 +102,8 @@ impl Form {
         let form = &mut desk.settings.scan;
         let field = egui::TextEdit::singleline(&mut form.name).desired_width(f32::INFINITY);
         ui.add(field).labelled_by(label.id);
-        egui::Grid::new("scan numbers").num_columns(2).show(ui, |ui| form.numbers(ui));
+        let numbers = egui::Grid::new("scan numbers").num_columns(2);
+        self.unread = !numbers.show(ui, |ui| form.numbers(ui)).inner;
         self.table(ui, desk);
         ui.separator();
         self.test(ui, desk);
@@ -135,8 +145,8 @@ impl Form {
                 .clicked();
             let label = ui.label(texts::LIGHT);
             let most = lights.saturating_sub(1);
-            let light = egui::DragValue::new(&mut self.test_light).range(0..=most).speed(0.05);
-            ui.add(light).labelled_by(label.id);
+            let light = Number::of(Unit::Count, 0.0..=most as f64).speed(0.05);
+            light.show(ui, texts::LIGHT, &mut self.test_light).response.labelled_by(label.id);
             if clicked {
                 let FormSettings { exposure_s, iso, .. } = desk.settings.scan;
                 let settings = Settings { exposure_s, iso };
@@ -153,26 +163,27 @@ impl Form {
         let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
         // Without a calibration the room is about getting one.
         let button = match calibrated {
-            true => widgets::primary(ui, text, size, can_go(desk, done)),
-            false => widgets::large(ui, text, size, can_go(desk, done)),
+            true => widgets::primary(ui, text, size, self.can_go(desk, done)),
+            false => widgets::large(ui, text, size, self.can_go(desk, done)),
         };
         let clicked = button.clicked();
         let taken = !done && is_taken(&desk.settings.scan.name, desk.place.as_ref());
-        let hint = match (desk.is_busy(), taken) {
-            (true, _) => texts::BUSY,
-            (_, true) => texts::TAKEN,
+        let hint = match (desk.is_busy(), taken, self.unread && !done) {
+            (true, ..) => texts::BUSY,
+            (_, true, _) => texts::TAKEN,
+            (.., true) => texts::UNREAD,
             _ => texts::SPACE,
         };
         ui.label(RichText::new(hint).small().weak());
         clicked
     }
-}
 
-/// Whether the big button can be pressed.
-pub(super) fn can_go(desk: &Desk, done: bool) -> bool {
-    let name = &desk.settings.scan.name;
-    let free = !name.trim().is_empty() && !is_taken(name, desk.place.as_ref());
-    !desk.is_busy() && (done || free)
+    /// Whether the big button can be pressed.
+    pub(super) fn can_go(&self, desk: &Desk, done: bool) -> bool {
+        let name = &desk.settings.scan.name;
+        let free = !name.trim().is_empty() && !is_taken(name, desk.place.as_ref());
+        !desk.is_busy() && (done || (free && !self.unread))
+    }
 }
 
 /// What to scan as the desk says.

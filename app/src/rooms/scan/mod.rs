@@ -1,6 +1,7 @@
 //! The Scan room, the daily loop: name, one big button, a strip that fills light by light, maps while later lights still fire,
 //! and a solution at the end.
 
+mod buttons;
 mod eyes;
 mod form;
 mod histogram;
@@ -17,6 +18,7 @@ use crate::rooms::{Room, look};
 use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
 use crate::{texts::scan as texts, theme, widgets};
+use buttons::Buttons;
 use eframe::egui;
 pub use form::FormSettings;
 use form::{Form, order};
@@ -122,6 +124,7 @@ pub(crate) enum Stage {
 #[derive(Debug, Default)]
 pub struct Scan {
     form: Form,
+    buttons: Buttons,
     stage: Stage,
     strip: Strip,
     view: View,
@@ -167,11 +170,14 @@ impl Scan {
         let running = self.is_running();
         egui::Panel::bottom("scan buttons").exact_size(form::BUTTON_HEIGHT).show(ui, |ui| {
             ui.add_space(theme::GAP);
-            if running {
-                self.running(ui, desk);
-            } else if self.form.button(ui, desk, self.is_done(desk)) {
-                self.go(desk);
-            }
+            let known = !self.buttons.are_new(ui, running);
+            ui.add_enabled_ui(known, |ui| {
+                if running {
+                    self.running(ui, desk);
+                } else if self.form.button(ui, desk, self.is_done(desk)) {
+                    self.go(desk);
+                }
+            });
         });
         egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| {
@@ -295,14 +301,15 @@ impl Scan {
     /// Space does what the big button does, Enter looks closer, wherever no text is being written.
     fn keys(&mut self, ui: &egui::Ui, desk: &mut Desk) {
         let free = !ui.ctx().egui_wants_keyboard_input();
-        let pressed = |key| free && ui.input(|input| input.key_pressed(key));
+        let pressed = |key| free && widgets::struck(ui, key);
         let space = pressed(egui::Key::Space);
         if let Stage::Solved { solution, .. } = &self.stage
             && pressed(egui::Key::Enter)
         {
             look_closer(solution, desk);
         }
-        if space && !self.is_running() && form::can_go(desk, self.is_done(desk)) {
+        let can_go = !self.is_running() && self.form.can_go(desk, self.is_done(desk));
+        if space && can_go && !self.buttons.are_new(ui, false) {
             self.go(desk);
         }
     }

@@ -92,17 +92,20 @@ impl View {
             let how = if self.layer == Layer::Relit { texts::DRAG_LIGHT } else { texts::DRAG_MAPS };
             ui.add(egui::Label::new(RichText::new(how).small().weak()).truncate());
         });
-        let (at_mm, height_mm) = *self.lamp.get_or_insert_with(|| first_lamp(&maps.geometry));
+        let drag_pans = self.layer != Layer::Relit;
+        let shown = self.map_view.begin(ui, maps, (texts::MAPS, drag_pans));
+        self.lamp.get_or_insert_with(|| first_lamp(&maps.geometry));
+        let first = PointerButton::Primary;
+        let carried = shown.response.dragged_by(first) || shown.response.drag_stopped_by(first);
+        if let Some(pixel) = shown.pixel_under_mouse().filter(|_| carried && !drag_pans) {
+            self.carry_lamp(pixel, &maps.geometry);
+        }
+        // Only now the lamp is where the hand is.
+        let (at_mm, height_mm) = self.lamp.unwrap_or_else(|| first_lamp(&maps.geometry));
         let light = lamp_over(&maps.geometry, at_mm, height_mm);
         let appearance = Appearance { light, ..Appearance::of(self.layer.mode()) };
-        let drag_pans = self.layer != Layer::Relit;
         let canvas = Canvas { maps, appearance: &appearance, name: texts::MAPS, drag_pans };
-        let shown = self.map_view.show(ui, &canvas);
-        let carried = !drag_pans && shown.response.dragged_by(PointerButton::Primary);
-        if let Some(pixel) = shown.pixel_under_mouse().filter(|_| carried) {
-            self.carry_lamp(pixel, &maps.geometry);
-            ui.ctx().request_repaint();
-        }
+        self.map_view.paint(ui, &shown, &canvas);
     }
 
     fn carry_lamp(&mut self, pixel: [f64; 2], geometry: &Geometry) {

@@ -1,6 +1,7 @@
 //! The shader with its pipeline, and what each view keeps on the graphics card.
 
 use super::appearance::Compose;
+use super::coarse::{Enlarger, Small};
 use super::pool::{Locator, NOWHERE, Pool};
 use super::pyramid::{Place, Pyramid, TILE, Texel};
 use super::shade::Uniform;
@@ -29,6 +30,7 @@ type Instance = [[f32; 4]; 1 + ROLES];
 #[derive(Debug)]
 struct Gpu {
     pipeline: wgpu::RenderPipeline,
+    enlarger: Enlarger,
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
     scales: wgpu::TextureView,
@@ -45,6 +47,8 @@ struct OnCard {
     instances: wgpu::Buffer,
     count: u32,
     bound: Option<wgpu::BindGroup>,
+    /// At half resolution, once that was wanted.
+    small: Option<Small>,
     drawn: u64,
 }
 
@@ -76,6 +80,8 @@ pub(super) struct Frame {
     pub(super) viewport: Viewport,
     /// Size of the view in points, and pixels per point.
     pub(super) screen: (Vec2, f32),
+    /// At half resolution.
+    pub(super) coarse: bool,
     pub(super) uniform: Box<Uniform>,
 }
 
@@ -95,6 +101,12 @@ impl Frame {
             of_side(0),
             of_side(1),
         ]
+    }
+
+    /// Pixels of the view at half resolution.
+    fn half_size_px(&self) -> [u32; 2] {
+        let (size, pixels_per_point) = self.screen;
+        [size.x, size.y].map(|points| (0.5 * points * pixels_per_point).ceil().max(1.0) as u32)
     }
 
     /// Brings what is seen to the card, a few tiles a frame, coarser ones standing in for the rest; true where some are still
@@ -196,7 +208,7 @@ impl CallbackTrait for Frame {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         _screen: &ScreenDescriptor,
-        _encoder: &mut wgpu::CommandEncoder,
+        encoder: &mut wgpu::CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
         if let Some(gpu) = resources.get_mut::<Gpu>() {
@@ -207,6 +219,9 @@ impl CallbackTrait for Frame {
                 self.ctx.request_repaint();
             }
             gpu.bind(self.id, device);
+            if self.coarse {
+                gpu.draw_small(self.id, self.half_size_px(), device, encoder);
+            }
         }
         Vec::new()
     }
@@ -219,11 +234,9 @@ impl CallbackTrait for Frame {
     ) {
         let Some(gpu) = resources.get::<Gpu>() else { return };
         let Some(view) = gpu.views.get(&self.id) else { return };
-        if let Some(bound) = view.bound.as_ref().filter(|_| view.count > 0) {
-            pass.set_pipeline(&gpu.pipeline);
-            pass.set_bind_group(0, bound, &[]);
-            pass.set_vertex_buffer(0, view.instances.slice(..));
-            pass.draw(0..4, 0..view.count);
+        match view.small.as_ref().filter(|_| self.coarse) {
+            Some(small) => gpu.enlarger.draw(small, pass),
+            None => view.draw(&gpu.pipeline, pass),
         }
     }
 }
@@ -244,7 +257,17 @@ impl OnCard {
             instances: buffer(64 * size_of::<Instance>(), wgpu::BufferUsages::VERTEX),
             count: 0,
             bound: None,
+            small: None,
             drawn: 0,
+        }
+    }
+
+    fn draw(&self, pipeline: &wgpu::RenderPipeline, pass: &mut wgpu::RenderPass<'_>) {
+        if let Some(bound) = self.bound.as_ref().filter(|_| self.count > 0) {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, bound, &[]);
+            pass.set_vertex_buffer(0, self.instances.slice(..));
+            pass.draw(0..4, 0..self.count);
         }
     }
 
@@ -275,6 +298,7 @@ impl Gpu {
         let layout = layout(device);
         Self {
             pipeline: pipeline(device, &layout, target),
+            enlarger: Enlarger::new(device, target),
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
@@ -285,6 +309,21 @@ impl Gpu {
             views: HashMap::new(),
             now: 0,
             texels: Vec::new(),
+        }
+    }
+
+    /// Draws a view at half resolution, beside the window.
+    fn draw_small(
+        &mut self,
+        id: Id,
+        size: [u32; 2],
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let Some(view) = self.views.get_mut(&id) else { return };
+        self.enlarger.fit(device, &self.sampler, &mut view.small, size);
+        if let Some(small) = &view.small {
+            view.draw(&self.pipeline, &mut small.pass(encoder));
         }
     }
 

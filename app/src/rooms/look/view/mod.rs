@@ -4,9 +4,11 @@
 //! of these only the tiles that are seen go to the graphics card, a few a frame.
 
 mod appearance;
+mod coarse;
 mod geometry;
 mod gpu;
 mod maps;
+mod pace;
 mod pool;
 mod pyramid;
 pub mod scales;
@@ -36,6 +38,7 @@ pub struct MapView {
     viewport: Option<Viewport>,
     /// Which maps it belongs to.
     size: [usize; 2],
+    pace: pace::Pace,
 }
 
 /// What is drawn.
@@ -102,24 +105,56 @@ impl MapView {
 
     /// Draws in all that is left of `ui`; wheel, pinch and drag act.
     pub fn show(&mut self, ui: &mut egui::Ui, canvas: &Canvas) -> Shown {
+        let shown = self.begin(ui, canvas.maps, (canvas.name, canvas.drag_pans));
+        self.paint(ui, &shown, canvas);
+        shown
+    }
+
+    /// The first half of [`MapView::show`]: takes all that is left of `ui`, and what the mouse does there. What the mouse
+    /// carries is moved before [`MapView::paint`], so that it is drawn where the mouse is now.
+    pub fn begin(
+        &mut self,
+        ui: &mut egui::Ui,
+        maps: &Maps,
+        (name, drag_pans): (&str, bool),
+    ) -> Shown {
         let (_, rect) = ui.allocate_space(ui.available_size());
         // Its own name: what else the room shows must not make another view of it in the middle of a drag.
-        let id = Id::unique(("map view", canvas.name));
-        let response = ui.interact(rect, id, Sense::click_and_drag());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, canvas.name));
-        let size = canvas.maps.size();
+        let id = Id::unique(("map view", name));
+        // No stop for the keyboard, which could do nothing here.
+        let response = ui.interact(rect, id, Sense::CLICK | Sense::DRAG);
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+        let size = maps.size();
         if self.size != size {
             // Where a place was chosen before the first maps came, it stays.
             self.viewport = self.viewport.filter(|_| self.size == [0, 0]);
             self.size = size;
         }
         let mut viewport = self.viewport.unwrap_or_else(|| Viewport::fit(size, rect));
-        let moved = navigate(&mut viewport, ui, &response, (size, rect), canvas.drag_pans);
+        let moved = navigate(&mut viewport, ui, &response, (size, rect), drag_pans);
         if moved || self.viewport.is_some() {
             self.viewport = Some(viewport);
         }
-        paint(ui, rect, &response, viewport, canvas);
         Shown { response, rect, viewport }
+    }
+
+    /// The second half of [`MapView::show`].
+    pub fn paint(&mut self, ui: &mut egui::Ui, shown: &Shown, canvas: &Canvas) {
+        let coarse = self.is_coarse(ui.ctx(), shown.rect);
+        paint(ui, shown, coarse, canvas);
+    }
+
+    /// Whether this frame is drawn at half resolution.
+    fn is_coarse(&mut self, ctx: &egui::Context, rect: Rect) -> bool {
+        let (dt_s, moved) =
+            ctx.input(|input| (input.unstable_dt, input.pointer.delta() != egui::Vec2::ZERO));
+        let dragged = ctx.dragged_id().is_some();
+        let pixels = rect.area() * ctx.pixels_per_point().powi(2);
+        let drawn = self.pace.next((dragged, moved), dt_s, pixels);
+        if drawn.again {
+            ctx.request_repaint();
+        }
+        drawn.coarse
     }
 }
 
@@ -166,28 +201,31 @@ fn say_no_graphics(ui: &mut egui::Ui, rect: Rect) {
     });
 }
 
-fn paint(ui: &mut egui::Ui, rect: Rect, response: &Response, viewport: Viewport, canvas: &Canvas) {
+fn paint(ui: &mut egui::Ui, shown: &Shown, coarse: bool, canvas: &Canvas) {
+    let (rect, viewport) = (shown.rect, shown.viewport);
     // Neutral, and not so bright that it blinds the eye to the cloth.
     let ground = Color32::from_gray(if ui.visuals().dark_mode { 20 } else { 200 });
     ui.painter().rect_filled(rect, 0.0, ground);
     let Some(renderer) = gpu::renderer(ui.ctx()) else {
         return say_no_graphics(ui, rect);
     };
-    let screen = (rect.size(), ui.ctx().pixels_per_point());
+    let pixels_per_point = ui.ctx().pixels_per_point();
+    let drawn_per_point = if coarse { 0.5 * pixels_per_point } else { pixels_per_point };
     let uniform = shade::uniform(
         canvas.appearance,
         &viewport,
         &canvas.maps.geometry,
-        screen,
+        (rect.size(), drawn_per_point),
         ground,
         renderer.encoding_target,
     );
     let frame = gpu::Frame {
-        id: response.id,
+        id: shown.response.id,
         ctx: ui.ctx().clone(),
         pictures: gpu::Frame::pictures(canvas),
         viewport,
-        screen,
+        screen: (rect.size(), pixels_per_point),
+        coarse,
         uniform: Box::new(uniform),
     };
     ui.painter().with_clip_rect(rect).add(Callback::new_paint_callback(rect, frame));

@@ -3,174 +3,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set its table up has failed")]
 
-use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+mod desktop;
+mod shell;
+
+use desktop::{Desktop, exists, until};
+use std::path::Path;
 use std::time::{Duration, Instant};
-use weavelight::simulate;
 
 /// Frames of the rig that is scanned: small, so that the test is quick; larger for pictures.
 const FRAME: [usize; 2] = [308, 204];
 const PICTURE_FRAME: [usize; 2] = [1232, 816];
-/// How long anything may take on a machine with much else to do.
-const PATIENCE: Duration = Duration::from_secs(180);
-
-/// A display without a screen, and the program in it.
-struct Desktop {
-    server: Child,
-    display: String,
-    app: Option<Child>,
-    home: tempfile::TempDir,
-}
-
-impl Desktop {
-    /// `None` where the tools are missing.
-    fn start() -> Option<Self> {
-        for tool in ["xdotool", "import"] {
-            Command::new(tool)
-                .arg("--version")
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .status()
-                .ok()?;
-        }
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .ok()?;
-        let mut number = String::new();
-        BufReader::new(server.stdout.take()?).read_line(&mut number).ok()?;
-        let display = format!(":{}", number.trim());
-        Some(Self { server, display, app: None, home: tempfile::tempdir().unwrap() })
-    }
-
-    fn home(&self) -> &Path {
-        self.home.path()
-    }
-
-    fn open(&mut self) {
-        let app = Command::new(env!("CARGO_BIN_EXE_weavelight-app"))
-            .env("DISPLAY", &self.display)
-            .env_remove("WAYLAND_DISPLAY")
-            .env("HOME", self.home())
-            .env("XDG_CONFIG_HOME", self.home().join("config"))
-            .env("XDG_RUNTIME_DIR", self.home())
-            .stdin(Stdio::null())
-            .spawn()
-            .unwrap();
-        self.app = Some(app);
-        self.xdotool(&[
-            "search",
-            "--sync",
-            "--onlyvisible",
-            "--name",
-            "^Weavelight$",
-            "windowfocus",
-        ]);
-    }
-
-    /// A calibrated rig that was open last, and the file that says so.
-    fn rig(&self, size_px: [usize; 2]) -> (PathBuf, PathBuf) {
-        let rig = self.home().join("rig");
-        let options = simulate::Options {
-            out: rig.clone(),
-            size_px: Some(size_px),
-            only: vec![simulate::Part::Swatch],
-            ..Default::default()
-        };
-        simulate::run(&options, &|_, _| ()).unwrap();
-        let config = self.home().join("config/weavelight");
-        std::fs::create_dir_all(&config).unwrap();
-        let file = config.join("settings.toml");
-        let settings = format!(
-            "schema = 1\nrig = {:?}\nhome = {:?}\ntheme = \"dark\"\n",
-            rig.display().to_string(),
-            self.home().display().to_string()
-        );
-        std::fs::write(&file, settings).unwrap();
-        (rig, file)
-    }
-
-    /// As by a power cut: no signal that a program could hear.
-    fn kill(&mut self) {
-        let mut app = self.app.take().unwrap();
-        app.kill().unwrap();
-        app.wait().unwrap();
-    }
-
-    fn xdotool(&self, arguments: &[&str]) {
-        let done = Command::new("xdotool")
-            .env("DISPLAY", &self.display)
-            .args(arguments)
-            .stdout(Stdio::null())
-            .status();
-        assert!(done.unwrap().success(), "xdotool {arguments:?}");
-    }
-
-    fn key(&self, keys: &str) {
-        self.xdotool(&["key", "--delay", "50", keys]);
-        // One frame to take it in.
-        std::thread::sleep(Duration::from_millis(300));
-    }
-
-    /// Clicks something by its place.
-    fn click(&self, [x, y]: [u32; 2]) {
-        // It may just be about to appear.
-        std::thread::sleep(Duration::from_secs(1));
-        self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "sleep", "0.2", "click", "1"]);
-    }
-
-    /// A picture of the screen; more than one colour is in it.
-    fn picture(&self, name: &str) -> PathBuf {
-        std::thread::sleep(Duration::from_millis(500));
-        let folder =
-            std::env::var_os("WEAVELIGHT_PICTURES").map_or(self.home().to_owned(), PathBuf::from);
-        let file = folder.join(format!("{name}.png"));
-        let done = Command::new("import")
-            .env("DISPLAY", &self.display)
-            .args(["-window", "root"])
-            .arg(&file)
-            .status();
-        assert!(done.unwrap().success());
-        let pixels = image::open(&file).unwrap().to_rgb8();
-        let first = *pixels.get_pixel(0, 0);
-        assert!(pixels.pixels().any(|pixel| *pixel != first), "{name}: nothing is drawn");
-        file
-    }
-
-    /// The program leaves by itself, without a complaint.
-    fn quit(&mut self) {
-        self.key("ctrl+q");
-        let mut app = self.app.take().unwrap();
-        let status = until("the program has left", || app.try_wait().unwrap());
-        assert!(status.success(), "{status}");
-    }
-}
-
-impl Drop for Desktop {
-    fn drop(&mut self) {
-        let _ = self.app.as_mut().map(Child::kill);
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-fn until<T>(what: &str, mut happened: impl FnMut() -> Option<T>) -> T {
-    let begun = Instant::now();
-    loop {
-        if let Some(value) = happened() {
-            return value;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what}: not yet");
-        std::thread::sleep(Duration::from_millis(100));
-    }
-}
-
-fn exists(file: &Path) {
-    until(&file.display().to_string(), || file.exists().then_some(()));
-}
 
 /// Pixels that differ visibly between two pictures.
 fn changed_pixels(before: &Path, after: &Path) -> usize {
@@ -261,6 +103,7 @@ fn the_first_run_takes_five_minutes() {
         println!("not run: Xvfb, xdotool or ImageMagick is missing");
         return;
     };
+    desktop.settings("schema = 1\nwindow_size = [1280.0, 800.0]\n");
     let rig = desktop.home().join("Weavelight/simulated rig");
     let begun = Instant::now();
     let tell = |what: &str| println!("{:5.1} s: {what}", begun.elapsed().as_secs_f64());
