@@ -126,7 +126,16 @@ fn closing_asks_while_it_scans_and_stops_the_scan_first() {
 fn control_q_closes_at_once_where_nothing_is_going_on() {
     let mut window = Window::new(desk::SMALL, egui::Theme::Light);
     window.harness.run();
-    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::Q);
+    // What it commands is said in that frame only.
+    let input = window.harness.input_mut();
+    input.modifiers = egui::Modifiers::COMMAND;
+    input.events.push(egui::Event::Key {
+        key: Key::Q,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: egui::Modifiers::COMMAND,
+    });
     window.harness.step();
     assert!(commands(&window).contains(&ViewportCommand::Close));
     assert!(!close(&mut window).contains(&ViewportCommand::CancelClose));

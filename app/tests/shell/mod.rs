@@ -60,10 +60,12 @@ fn a_problem_moves_nothing_and_can_be_read() {
         modifiers: egui::Modifiers::NONE,
     });
     window.harness.step();
+    let text = &window.harness.state().desk().problems.last().unwrap().text;
+    let expected = format!("Scan failed: {text}");
     let copied = &window.harness.output().platform_output.commands;
     assert!(
         copied.iter().any(|command| matches!(command,
-            egui::OutputCommand::CopyText(text) if *text == format!("Scan failed: 4: {long}"))),
+            egui::OutputCommand::CopyText(text) if *text == expected)),
         "{copied:?}"
     );
     // Hidden, they are a button; the next one shows them again.
