@@ -61,6 +61,16 @@ pub fn entered(ui: &egui::Ui, field: &egui::Response) -> bool {
     field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
 }
 
+/// At the end of what scrolls: what has just got the keyboard comes into sight.
+pub fn reveal_focus(ui: &egui::Ui) {
+    let focused = ui.ctx().memory(|memory| memory.focused());
+    let Some(response) = focused.and_then(|id| ui.ctx().read_response(id)) else { return };
+    let is_ours = response.layer_id == ui.layer_id() && ui.min_rect().contains_rect(response.rect);
+    if is_ours && response.gained_focus() {
+        ui.scroll_to_rect(response.rect.expand(crate::theme::GAP), None);
+    }
+}
+
 /// Draws a ring around what has the keyboard, whatever that is.
 pub fn show_focus(ctx: &egui::Context) {
     let focused = ctx.memory(|memory| memory.focused());

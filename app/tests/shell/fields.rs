@@ -16,7 +16,10 @@ fn write(window: &mut Window, label: &str, text: &str) {
     window.harness.step();
     window.harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
     window.harness.step();
+    window.harness.key_press(Key::Backspace);
     window.harness.event(eframe::egui::Event::Text(text.to_owned()));
+    // The button above the fields sees it in the next frame.
+    window.harness.step();
     window.harness.step();
 }
 

@@ -121,7 +121,10 @@ impl Calibrate {
         }
         let pane = egui::Panel::left("calibration steps").exact_size(292.0).resizable(false);
         pane.show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| self.left(ui, desk));
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                self.left(ui, desk);
+                widgets::reveal_focus(ui);
+            });
         });
         let task = self.wanted();
         if let (Some(task), Some(state)) = (task, &self.state)

@@ -7,7 +7,7 @@ use super::{Ask, Look, Tool, plots};
 use crate::desk::Desk;
 use crate::number::{Number, Unit};
 use crate::texts::look as texts;
-use crate::widgets::Sign;
+use crate::widgets::{self, Sign};
 use crate::worker::Command;
 use eframe::egui::emath::Numeric;
 use eframe::egui::{self, Button, ComboBox, RichText, ScrollArea, Slider, Ui, vec2};
@@ -40,6 +40,7 @@ impl Look {
                 section(ui, texts::SLOPES, |ui| plots::histogram(ui, texts::SLOPES, slopes));
             }
             self.other_section(ui);
+            widgets::reveal_focus(ui);
         });
     }
 

@@ -63,7 +63,10 @@ impl Rig {
         }
         let pane = egui::Panel::left("rig parts").exact_size(320.0).resizable(false);
         pane.show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| self.parts(ui, desk));
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                self.parts(ui, desk);
+                widgets::reveal_focus(ui);
+            });
         });
         egui::CentralPanel::default().show(ui, |ui| self.lights(ui, desk));
     }
@@ -133,6 +136,7 @@ impl Rig {
         });
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             clicked = clicked.or(self.table(ui, &lamps));
+            widgets::reveal_focus(ui);
         });
         if let Some(light) = clicked.filter(|_| !desk.is_busy()) {
             let wanted = (self.lit != Some(light)).then_some(light);

@@ -185,6 +185,7 @@ impl Scan {
                 self.offer_unfinished(ui, desk);
                 tell_expired(ui, desk);
                 ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
+                widgets::reveal_focus(ui);
             });
         });
     }
