@@ -127,9 +127,7 @@ fn control_q_closes_at_once_where_nothing_is_going_on() {
     let mut window = Window::new(desk::SMALL, egui::Theme::Light);
     window.harness.run();
     // What it commands is said in that frame only.
-    let input = window.harness.input_mut();
-    input.modifiers = egui::Modifiers::COMMAND;
-    input.events.push(egui::Event::Key {
+    window.harness.input_mut().events.push(egui::Event::Key {
         key: Key::Q,
         physical_key: None,
         pressed: true,

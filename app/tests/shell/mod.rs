@@ -5,7 +5,7 @@ mod leaving;
 
 use super::desk::{self, Window};
 use eframe::egui::{self, Key, Rect};
-use egui_kittest::kittest::{NodeT, Queryable};
+use egui_kittest::kittest::Queryable;
 use weavelight_app::desk::Problem;
 use weavelight_app::rooms::Room;
 use weavelight_app::worker::{Command, Update};
