@@ -42,7 +42,7 @@ pub use light_set::LightSet;
 #[cfg(feature = "gpu")]
 pub(crate) use method::chi_square_limit;
 pub use method::{MAX_LIGHTS, Method};
-pub use noise::estimate_noise;
+pub use noise::{NoiseEvidence, NoiseSample, estimate_noise};
 pub use normalise::{Normalisation, normalise_row};
 pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
 pub(crate) use reference::{inverse_if_conditioned, variance};

@@ -2,15 +2,16 @@
 //!
 //! A residual is sensor noise, or light that the model does not describe (gloss, shadow, bounce, errors of the light
 //! field). Noise is independent from photosite to photosite; what the model leaves over is shared by neighbours. So shot
-//! noise and floor come from second differences of the residual between photosites of the same colour, and kappa from
-//! what the residual itself has beyond them. Medians and lower quartiles make both blind to the places where the model
-//! fails badly, which are for the subset test.
+//! noise and floor come from the difference between the residual of a photosite and those of its four neighbours of the
+//! same colour, and kappa from what the residual itself has beyond them. Medians and lower quartiles make both blind to the
+//! places where the model fails badly, which are for the subset test.
+//!
+//! Nothing here depends on the order of photosites, lights or neighbours, but for the rounding of sums over lights.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::method::MAX_LIGHTS;
 use super::reference::inverse_if_conditioned;
-use super::row::{RowInput, VarianceModel};
+use super::row::VarianceModel;
 
 /// A light field and a surface that differ from the model by more than this differ in a way that is no noise: the subset
 /// test is to see it. (On the DiLiGenT objects, where residuals of 5 to 10 % are usual, weights and subset test do best
@@ -23,14 +24,29 @@ const GROUPS: usize = 12;
 /// Fewest photosites from which noise is estimated.
 const FEWEST_PHOTOSITES: usize = 20 * GROUPS;
 
-/// Distance of the next photosite of the same colour.
-const SAME_COLOR: usize = 2;
+/// Variance of four times a sample less its four neighbours, relative to that of one sample.
+const DIFFERENCE_VARIANCE: f64 = 20.0;
+
+/// One photosite and its four nearest neighbours of the same colour, under every light.
+pub struct NoiseSample<'a> {
+    /// Light vectors, as the kernels read them; at the neighbours they differ by too little to matter, and by opposite
+    /// amounts.
+    pub vectors: &'a [Vector3<f64>],
+    /// Normalised signal of the photosite. Not a number where unusable.
+    pub signal: &'a [f64],
+    /// Four times that, less the signals of the neighbours.
+    pub difference: &'a [f64],
+    /// Per light: what *one unit* of each term is in the normalised signal (for frames alike in exposure and light: 1, 1, 1).
+    pub variance: &'a [VarianceModel],
+    /// What the lights' gain maps together do to the noise, 1 without them: [`RowInput::noise_scale`](super::RowInput).
+    pub noise_scale: f64,
+}
 
 /// What one photosite says: squared residuals, and what each unit of noise would contribute to their sum.
 #[derive(Clone, Copy, Debug)]
-struct Evidence {
+pub struct NoiseEvidence {
     brightness: f64,
-    /// Sum over lights of the squared second difference of the residual, divided by 6: its variance is that of one residual.
+    /// Sum over lights of the squared difference of the residual, in units of the variance of one residual.
     difference: f64,
     /// Sum over lights of the squared residual.
     total: f64,
@@ -38,19 +54,65 @@ struct Evidence {
     unit: [f64; 3],
 }
 
-/// Estimates the noise from rows of at least four lights. `variance` of each row must hold what *one unit* of each term is
-/// in the row's normalised signal (for frames alike in exposure and light: 1, 1, 1); what comes back are the numbers of
-/// units: shot, floor, kappa.
+impl NoiseEvidence {
+    /// `None` where the photosite says nothing: a sample is unusable, its lights do not span space, or there are fewer than
+    /// four.
+    pub fn of(sample: &NoiseSample) -> Option<Self> {
+        let vectors = sample.vectors;
+        if vectors.len() < 4 {
+            return None;
+        }
+        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        let known = vectors.iter().all(|vector| finite(vector.as_slice()));
+        if !(known && finite(sample.signal) && finite(sample.difference)) {
+            return None;
+        }
+        let matrix: Matrix3<f64> = vectors.iter().map(|l| l * l.transpose()).sum();
+        let inverse = inverse_if_conditioned(&matrix)?;
+        let fit = |values: &[f64]| -> Vector3<f64> {
+            inverse * vectors.iter().zip(values).map(|(l, y)| l * *y).sum::<Vector3<f64>>()
+        };
+        // The residual of a difference is the difference of the residuals.
+        let (surface, change) = (fit(sample.signal), fit(sample.difference));
+        let scale = sample.noise_scale;
+        let mut found = Self { brightness: 0.0, difference: 0.0, total: 0.0, unit: [0.0; 3] };
+        for (i, l) in vectors.iter().enumerate() {
+            let (predicted, model) = (surface.dot(l), sample.variance[i]);
+            let lit = predicted.max(0.0);
+            // The share of a sample's variance that its residual shows.
+            let shown = 1.0 - l.dot(&(inverse * l));
+            found.brightness += lit;
+            found.difference +=
+                (sample.difference[i] - change.dot(l)).powi(2) / DIFFERENCE_VARIANCE;
+            found.total += (sample.signal[i] - predicted).powi(2);
+            found.unit[0] += shown * f64::from(model.shot) * scale * lit;
+            found.unit[1] += shown * f64::from(model.floor) * scale * scale;
+            found.unit[2] += shown * (f64::from(model.kappa) * lit).powi(2);
+        }
+        let finite = finite(&found.unit) && found.total.is_finite() && found.difference.is_finite();
+        (finite && found.brightness > 0.0).then_some(found)
+    }
+
+    /// An order of its own, so that the order in which the photosites were visited does not matter.
+    fn order(&self, other: &Self) -> std::cmp::Ordering {
+        let key = |e: &Self| [e.brightness, e.difference, e.total, e.unit[0], e.unit[1], e.unit[2]];
+        let pairs = key(self).into_iter().zip(key(other));
+        pairs
+            .map(|(a, b)| a.total_cmp(&b))
+            .find(|order| order.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    }
+}
+
+/// Estimates the noise from what photosites under `lights` lights say: numbers of units of shot, floor and kappa.
 ///
-/// `None` where the rows do not tell: three lights (no residual), or too few photosites with three usable neighbours of
-/// their colour.
-pub fn estimate_noise(rows: &[RowInput]) -> Option<VarianceModel> {
-    let mut evidence: Vec<Evidence> = rows.iter().flat_map(evidence_of_row).collect();
-    if evidence.len() < FEWEST_PHOTOSITES {
+/// `None` where they do not tell: three lights (no residual), or too few photosites.
+pub fn estimate_noise(mut evidence: Vec<NoiseEvidence>, lights: usize) -> Option<VarianceModel> {
+    if evidence.len() < FEWEST_PHOTOSITES || lights < 4 {
         return None;
     }
-    evidence.sort_by(|a, b| a.brightness.total_cmp(&b.brightness));
-    let freedom = (rows.first()?.field.lights - 3) as f64;
+    evidence.sort_by(NoiseEvidence::order);
+    let freedom = (lights - 3) as f64;
     let groups: Vec<Group> =
         evidence.chunks(evidence.len().div_ceil(GROUPS)).map(|g| Group::new(g, freedom)).collect();
     let [shot, floor] = non_negative_fit(&groups);
@@ -66,10 +128,10 @@ struct Group {
 }
 
 impl Group {
-    fn new(evidence: &[Evidence], freedom: f64) -> Self {
+    fn new(evidence: &[NoiseEvidence], freedom: f64) -> Self {
         let mean =
             |i: usize| evidence.iter().map(|e| e.unit[i]).sum::<f64>() / evidence.len() as f64;
-        let quantile = |share: f64, value: fn(&Evidence) -> f64| {
+        let quantile = |share: f64, value: fn(&NoiseEvidence) -> f64| {
             let mut values: Vec<f64> = evidence.iter().map(value).collect();
             values.sort_by(f64::total_cmp);
             let expected = chi_square_quantile_over_mean(share, freedom);
@@ -118,75 +180,4 @@ fn kappa(groups: &[Group], shot: f64, floor: f64) -> f64 {
     squares.sort_by(f64::total_cmp);
     let middle = squares.get(squares.len() / 2).copied().unwrap_or(0.0);
     middle.max(0.0).sqrt().min(MOST_KAPPA)
-}
-
-/// Plain residuals of a photosite.
-struct Residuals {
-    residual: [f64; MAX_LIGHTS],
-    predicted: [f64; MAX_LIGHTS],
-    /// 1 - h_ii: the share of a sample's variance that its residual shows.
-    shown: [f64; MAX_LIGHTS],
-}
-
-fn evidence_of_row(row: &RowInput) -> Vec<Evidence> {
-    let lights = row.field.lights;
-    let width = row.signal.first().map_or(0, |signal| signal.len());
-    if !(4..=MAX_LIGHTS).contains(&lights)
-        || row.signal.len() != lights
-        || row.variance.len() != lights
-    {
-        return Vec::new();
-    }
-    let residuals: Vec<Option<Residuals>> =
-        (0..width).map(|column| residuals(row, column)).collect();
-    let inner = SAME_COLOR..width.saturating_sub(SAME_COLOR);
-    inner.filter_map(|column| evidence(row, &residuals, column)).collect()
-}
-
-fn residuals(row: &RowInput, column: usize) -> Option<Residuals> {
-    let lights = row.field.lights;
-    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for i in 0..lights {
-        let (l, y) = (row.field.at(column, i), f64::from(*row.signal[i].get(column)?));
-        if !y.is_finite() || l.iter().any(|c| !c.is_finite()) {
-            return None;
-        }
-        matrix += l * l.transpose();
-        right += y * l;
-    }
-    let inverse = inverse_if_conditioned(&matrix)?;
-    let g = inverse * right;
-    let mut found = Residuals {
-        residual: [0.0; MAX_LIGHTS],
-        predicted: [0.0; MAX_LIGHTS],
-        shown: [0.0; MAX_LIGHTS],
-    };
-    for i in 0..lights {
-        let l = row.field.at(column, i);
-        found.predicted[i] = g.dot(&l);
-        found.residual[i] = f64::from(row.signal[i][column]) - found.predicted[i];
-        found.shown[i] = 1.0 - l.dot(&(inverse * l));
-    }
-    (g.norm() > 0.0).then_some(found)
-}
-
-fn evidence(row: &RowInput, residuals: &[Option<Residuals>], column: usize) -> Option<Evidence> {
-    let before = residuals[column - SAME_COLOR].as_ref()?;
-    let here = residuals[column].as_ref()?;
-    let after = residuals[column + SAME_COLOR].as_ref()?;
-    let scale = row.noise_scale.map_or(1.0, |scale| f64::from(scale[column]));
-    let mut evidence = Evidence { brightness: 0.0, difference: 0.0, total: 0.0, unit: [0.0; 3] };
-    for i in 0..row.field.lights {
-        let predicted = here.predicted[i].max(0.0);
-        let model = row.variance[i][column & 1];
-        let second = 2.0 * here.residual[i] - before.residual[i] - after.residual[i];
-        evidence.brightness += predicted;
-        evidence.difference += second * second / 6.0;
-        evidence.total += here.residual[i].powi(2);
-        evidence.unit[0] += here.shown[i] * f64::from(model.shot) * scale * predicted;
-        evidence.unit[1] += here.shown[i] * f64::from(model.floor) * scale * scale;
-        evidence.unit[2] += here.shown[i] * (f64::from(model.kappa) * predicted).powi(2);
-    }
-    let finite = evidence.unit.iter().all(|u| u.is_finite()) && evidence.total.is_finite();
-    (finite && evidence.brightness > 0.0).then_some(evidence)
 }

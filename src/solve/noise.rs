@@ -128,8 +128,13 @@ fn grey_variance(channels: [VarianceModel; 3]) -> VarianceModel {
     VarianceModel { shot: sum(|v| v.shot), floor: sum(|v| v.floor), kappa: channels[1].kappa }
 }
 
-/// Full scale of the scene's sensor in raw numbers: of the first frame's first photosite.
+/// Full scale of the scene's sensor in raw numbers: the mean over the 2 x 2 cell, and the largest of all frames.
 pub(crate) fn full_scale(scene: &Scene) -> f64 {
-    let first = scene.lights.iter().flat_map(|light| &light.exposures).next();
-    first.map_or(1.0, |exposure| f64::from(Reading::new(&exposure.frame, &scene.color).range()[0]))
+    let of_frame = |exposure: &Exposure| {
+        let range = Reading::new(&exposure.frame, &scene.color).range();
+        range.iter().map(|&range| f64::from(range)).sum::<f64>() / 4.0
+    };
+    let lit = scene.lights.iter().flat_map(|light| &light.exposures);
+    let largest = lit.map(of_frame).fold(0.0, f64::max);
+    if largest > 0.0 { largest } else { 1.0 }
 }

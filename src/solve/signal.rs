@@ -7,6 +7,7 @@ use super::scene::{Exposure, Scene};
 use super::sensor::{GREY, Reading, intensity_of_places};
 use crate::instrument::Defects;
 use crate::raw::Layout;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// How every row of a scene is normalised.
@@ -234,16 +235,18 @@ impl<'a> Normalizer<'a> {
             return 0.0;
         }
         let (width, height) = self.frame_px;
-        let mut rows = SignalRows::default();
-        rows.resize(self, width);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for y in (0..height).step_by((height / 64).max(1)) {
-            self.ambient_row(y, 0..width, &mut rows);
-            for &rate in rows.ambient.iter().flatten().filter(|rate| rate.is_finite()) {
-                sum += f64::from(rate);
-                count += 1.0;
-            }
-        }
+        // Sums of rows, added in order: the same whatever the number of threads.
+        let of_rows: Vec<(f64, f64)> = (0..height)
+            .into_par_iter()
+            .map_init(SignalRows::default, |rows, y| {
+                rows.resize(self, width);
+                self.ambient_row(y, 0..width, rows);
+                let rates = rows.ambient.iter().flatten().filter(|rate| rate.is_finite());
+                rates.fold((0.0, 0.0), |(sum, count), &rate| (sum + f64::from(rate), count + 1.0))
+            })
+            .collect();
+        let (sum, count) =
+            of_rows.iter().fold((0.0, 0.0), |(sum, count), (s, n)| (sum + s, count + n));
         if count > 0.0 { sum / count } else { 0.0 }
     }
 }

@@ -10,15 +10,14 @@ use crate::raw::Layout;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use weavelight_calibration::gain::gain_at;
 
-/// Photosites asked: rows and columns of a coarse lattice over the frame.
-const ROWS: usize = 24;
-const COLUMNS: usize = 64;
+/// Photosites asked: as many rows and columns of a coarse lattice over the frame.
+const LATTICE: usize = 40;
 /// Fewer than this and nothing is said.
 const LEAST_PHOTOSITES: usize = 30;
 /// A light below this share of its prediction adds nothing and is left out.
 const DARK_SHARE: f64 = 0.05;
-/// A light below this share (or above its inverse) is worth a warning.
-const ODD_SHARE: f64 = 0.5;
+/// A light below this share (or above its inverse) is worth a warning: one whose exposure is off by a factor of two is.
+const ODD_SHARE: f64 = 0.6;
 /// Predictions below this share of the photosite's brightest sample are not compared: shadows look like dark lights.
 const CLEARLY_LIT: f64 = 0.3;
 /// Exchanging two lights must bring the mean residual below this share of what it is ...
@@ -110,9 +109,9 @@ fn witnesses(scene: &Scene, field: &LightField) -> Vec<Witness> {
     let normalizer = Normalizer::new(scene, &equal);
     let mut rows = SignalRows::default();
     let mut found = vec![];
-    for y in lattice(scene.height, ROWS) {
+    for y in lattice(scene.height) {
         normalizer.row(y, 0..scene.width, &mut rows);
-        for x in lattice(scene.width, COLUMNS) {
+        for x in lattice(scene.width) {
             if scene.mask.as_ref().is_some_and(|mask| !mask.at(x, y)) {
                 continue;
             }
@@ -144,9 +143,14 @@ fn strength(scene: &Scene, light: &PhotographedLight, [x, y]: [usize; 2]) -> f64
     }
 }
 
-fn lattice(length: usize, count: usize) -> impl Iterator<Item = usize> {
-    let count = count.min(length);
-    (0..count).map(move |k| (2 * k + 1) * length / (2 * count))
+/// Places along one side, the same from either end: turned pictures are asked at the same photosites.
+fn lattice(length: usize) -> impl Iterator<Item = usize> {
+    let count = LATTICE.min(length);
+    let place = move |k: usize| (2 * k + 1) * length / (2 * count);
+    (0..count).map(move |k| match 2 * k < count {
+        true => place(k),
+        false => length - 1 - place(count - 1 - k),
+    })
 }
 
 /// The light whose share of its prediction by the others is the farthest from one, if it is odd: its position in `lights`

@@ -8,6 +8,7 @@
 )]
 
 mod commands;
+mod layouts;
 mod outline;
 mod photograph;
 mod swapped_lights;

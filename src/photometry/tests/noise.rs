@@ -1,16 +1,51 @@
 //! The noise model from residuals.
 
 use super::scene::{Random, Scene, reference_lights, reference_noise, tilted};
-use crate::photometry::{RowInput, VarianceModel, estimate_noise};
+use crate::photometry::{NoiseEvidence, NoiseSample, VarianceModel, estimate_noise};
+use nalgebra::Vector3;
 
 const UNIT: VarianceModel = VarianceModel { shot: 1.0, floor: 1.0, kappa: 1.0 };
 
+/// The row's next and next but one photosites of a colour stand for the four neighbours of a picture.
+fn evidence(scene: &Scene) -> Vec<NoiseEvidence> {
+    let variance = vec![UNIT; scene.lights];
+    let width = scene.signal[0].len();
+    let of_column = |column: usize| {
+        let at = |column: usize| {
+            scene.signal.iter().map(|row| f64::from(row[column])).collect::<Vec<_>>()
+        };
+        let (signal, mut difference) = (at(column), at(column));
+        difference.iter_mut().for_each(|y| *y *= 4.0);
+        for neighbour in [column - 4, column - 2, column + 2, column + 4] {
+            difference.iter_mut().zip(at(neighbour)).for_each(|(sum, y)| *sum -= y);
+        }
+        let field = scene.field();
+        let vectors: Vec<Vector3<f64>> = (0..scene.lights).map(|i| field.at(column, i)).collect();
+        NoiseEvidence::of(&NoiseSample {
+            vectors: &vectors,
+            signal: &signal,
+            difference: &difference,
+            variance: &variance,
+            noise_scale: 1.0,
+        })
+    };
+    (4..width - 4).filter_map(of_column).collect()
+}
+
 fn estimate(scene: &Scene) -> Option<VarianceModel> {
-    let signal: Vec<&[f32]> = scene.signal.iter().map(Vec::as_slice).collect();
-    let variance = vec![[UNIT; 2]; scene.lights];
-    let row =
-        RowInput { signal: &signal, field: scene.field(), variance: &variance, noise_scale: None };
-    estimate_noise(&[row])
+    estimate_noise(evidence(scene), scene.lights)
+}
+
+/// However the photosites come, the answer is the same to the last bit.
+#[test]
+fn the_order_of_the_photosites_does_not_matter() {
+    let scene = scene(reference_noise(), 0.3);
+    let mut evidence = evidence(&scene);
+    let expected = estimate_noise(evidence.clone(), scene.lights);
+    evidence.reverse();
+    assert_eq!(estimate_noise(evidence.clone(), scene.lights), expected);
+    evidence.rotate_left(1234);
+    assert_eq!(estimate_noise(evidence, scene.lights), expected);
 }
 
 /// Facets 40 columns wide, with `noise`; the surface is glossy where `gloss` says so.

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 
 use super::scene::{Solved, angle_deg};
-use crate::photometry::{FieldRow, Method, RowInput, RowSolver, VarianceModel, estimate_noise};
+use crate::photometry::{
+    FieldRow, Method, NoiseEvidence, NoiseSample, RowInput, RowSolver, VarianceModel,
+    estimate_noise,
+};
 
 /// An object's rows: grey values divided by the lights' intensities, NaN outside the mask, and the true normals.
 struct Object {
@@ -68,21 +71,29 @@ impl Object {
     }
 
     fn noise(&self) -> VarianceModel {
-        let vectors = self.vectors();
-        let unit =
-            vec![[VarianceModel { shot: 1.0, floor: 1.0, kappa: 1.0 }; 2]; self.lights.len()];
-        let rows: Vec<usize> = self.rows().step_by(8).collect();
-        let signals: Vec<Vec<&[f32]>> = rows.iter().map(|&start| self.row(start)).collect();
-        let inputs: Vec<RowInput> = signals
-            .iter()
-            .map(|signal| RowInput {
-                signal,
-                field: self.field(&vectors),
+        let vectors: Vec<Vector3<f64>> = self.lights.iter().map(|l| Vector3::from(*l)).collect();
+        let unit = vec![VarianceModel { shot: 1.0, floor: 1.0, kappa: 1.0 }; vectors.len()];
+        let near = [2, 2 * self.width];
+        let inner = near[1]..self.truth.len() - near[1];
+        let of_place = |at: usize| {
+            let y = |at: usize| self.signal.iter().map(move |signal| f64::from(signal[at]));
+            let around = y(at - near[0]).zip(y(at + near[0]));
+            let around = around.zip(y(at - near[1])).zip(y(at + near[1]));
+            let signal: Vec<f64> = y(at).collect();
+            let difference: Vec<f64> = around
+                .zip(&signal)
+                .map(|((((a, b), c), d), y)| 4.0 * y - (a + b + c + d))
+                .collect();
+            NoiseEvidence::of(&NoiseSample {
+                vectors: &vectors,
+                signal: &signal,
+                difference: &difference,
                 variance: &unit,
-                noise_scale: None,
+                noise_scale: 1.0,
             })
-            .collect();
-        estimate_noise(&inputs).unwrap()
+        };
+        let evidence = inner.step_by(3).filter_map(of_place).collect();
+        estimate_noise(evidence, vectors.len()).unwrap()
     }
 
     fn row(&self, start: usize) -> Vec<&[f32]> {
