@@ -2,6 +2,7 @@
 
 use super::buffers::{Buffers, Flight};
 use super::pack::Packed;
+use super::quiet::Quiet;
 use super::{Adapter, GpuError, Tile};
 use crate::photometry::Method;
 use std::future::Future;
@@ -37,6 +38,7 @@ impl Gpu {
     /// # Errors
     /// Where there is none, or it refuses.
     pub fn open() -> Result<Self, GpuError> {
+        let quiet = Quiet::begin();
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::VULKAN,
             flags: wgpu::InstanceFlags::empty(),
@@ -47,6 +49,7 @@ impl Gpu {
             ..Default::default()
         };
         let found = now(instance.request_adapter(&wanted)).map_err(|_| GpuError::NoAdapter)?;
+        drop(quiet);
         let adapter = described(&found.get_info());
         let unusable = |why: String| GpuError::Unusable { adapter: adapter.name.clone(), why };
         let (device, queue) = now(found.request_device(&wgpu::DeviceDescriptor {

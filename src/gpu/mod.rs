@@ -14,6 +14,8 @@ mod device;
 mod error;
 #[cfg(feature = "gpu")]
 mod pack;
+#[cfg(feature = "gpu")]
+mod quiet;
 #[cfg(test)]
 #[cfg(feature = "gpu")]
 pub(crate) mod tests;
