@@ -25,6 +25,8 @@ const RESIDUAL: &str = "residual-";
 pub const REPORT_JSON: &str = "report.json";
 /// The page that a person looks at.
 pub const REPORT_HTML: &str = "report.html";
+/// Start of the name of the mask among a report's inputs; the file's name follows.
+pub const MASK_INPUT: &str = "mask:";
 /// The calibration's camera, copied.
 pub const CAMERA_TOML: &str = crate::instrument::CAMERA_FILE;
 

@@ -57,7 +57,8 @@ pub struct Report {
     pub residuals: Vec<ResidualFile>,
     /// Sentences; the same go to standard error.
     pub warnings: Vec<String>,
-    /// The capture session's manifest and the calibration's files, with their hashes.
+    /// The capture session's manifest, the calibration's files with its gain maps, and the mask where there is one
+    /// ([`MASK_INPUT`](super::MASK_INPUT)), with their hashes.
     pub inputs: Vec<Input>,
     /// Where these were.
     #[serde(default, skip_serializing_if = "Option::is_none")]

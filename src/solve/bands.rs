@@ -339,7 +339,7 @@ impl<'a> Run<'a> {
         }
         if let Some(hand_out) = self.residuals {
             of_light.clear();
-            of_light.resize(self.scene.width, 0.0);
+            of_light.resize(self.scene.width, f32::NAN);
             for (light, signal) in rows.signals().iter().enumerate() {
                 let inside = &mut of_light[columns.clone()];
                 residual_row(light, signal, &field, &output, inside);
@@ -355,7 +355,7 @@ impl<'a> Run<'a> {
     pub(super) fn no_residuals(&self, worker: &mut Worker, y: usize) {
         let Some(hand_out) = self.residuals else { return };
         worker.of_light.clear();
-        worker.of_light.resize(self.scene.width, 0.0);
+        worker.of_light.resize(self.scene.width, f32::NAN);
         (0..self.scene.lights.len()).for_each(|light| hand_out(light, y, &worker.of_light));
     }
 

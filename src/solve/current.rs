@@ -1,45 +1,140 @@
 //! What is up to date is not made again: a solution remembers the hash of everything it was made from.
 
 use super::encode::map_files;
-use super::{Device, MaskChoice, Options, Residuals, SolveError};
-use crate::files::{FileError, PROGRAM, sha256_hex, sha256_of_file};
-use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE};
-use crate::session::Session;
-use crate::solution::{self, REPORT_JSON, Report, ResidualFile};
+use super::run::method_name;
+use super::{Device, Grid, MaskChoice, NormalY, Options, Residuals, SolveError};
+use crate::files::{FileError, Input, PROGRAM, sha256_hex, sha256_of_file};
+use crate::instrument::{CAMERA_FILE, COLOR_FILE, DEFECTS_FILE, LIGHTS_FILE};
+use crate::session::{Session, SessionError};
+use crate::solution::{self, MASK_INPUT, REPORT_JSON, Report, ResidualFile};
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Hash of inputs and settings together: the program's version, the settings, the manifest (which holds the frames'
-/// hashes), frames whose hash it lacks, the calibration's files and the mask. Which maps are made is no part of it: it does
-/// not change them.
-pub(crate) fn key(
-    options: &Options,
-    session: &Session,
-    calibration: &Calibration,
-) -> Result<String, SolveError> {
-    let Options { method, grid, normal_y, scale, .. } = options;
-    let found = options.mask == MaskChoice::Found;
-    let mut text = format!("{PROGRAM} {method:?} {grid:?} {normal_y:?} {scale:?} {found}");
+/// The revision of the solve. Raise it in every change after which the same inputs give other maps, be it in a kernel, in the
+/// noise estimate, in what is left out or in how files are encoded: solutions of earlier revisions are then made again. The
+/// golden test (`tests/golden.rs`) fails where a map changed and this did not.
+pub(crate) const REVISION: u32 = 2;
+
+/// The inputs of a solve as they were when it began.
+pub(crate) struct Inputs {
+    /// Manifest, calibration files and mask, with the names that the report gives them.
+    named: Vec<(PathBuf, Input)>,
+    /// Frames of which the manifest has no hash, by place in it.
+    frames: Vec<(usize, String)>,
+}
+
+impl Inputs {
+    /// Hashes everything that a solve reads, except frames whose hash the manifest has.
+    pub(crate) fn of(options: &Options, session: &Session) -> Result<Self, FileError> {
+        let folder = &options.calibration;
+        let mut files = vec![session.manifest_path()];
+        files.extend(calibration_files(folder)?);
+        let mut names: Vec<String> = files.iter().map(|path| file_name(path)).collect();
+        if let Some(mask) = options.mask.file(session) {
+            names.push(format!("{MASK_INPUT}{}", file_name(&mask)));
+            files.push(mask);
+        }
+        let named = files.into_par_iter().zip(names).map(|(path, name)| {
+            let sha256 = sha256_of_file(&path)?;
+            Ok((path, Input { name, sha256 }))
+        });
+        let unhashed = session.frames.par_iter().enumerate();
+        let unhashed = unhashed.filter(|(_, frame)| frame.sha256.is_none());
+        let frames = unhashed
+            .map(|(k, frame)| sha256_of_file(&session.frame_path(frame)).map(|hash| (k, hash)));
+        Ok(Self {
+            named: named.collect::<Result<_, FileError>>()?,
+            frames: frames.collect::<Result<_, FileError>>()?,
+        })
+    }
+
+    /// For the report.
+    pub(crate) fn for_report(&self) -> Vec<Input> {
+        self.named.iter().map(|(_, input)| input.clone()).collect()
+    }
+
+    /// The capture session with a hash for every frame, so that what is read is what was hashed.
+    pub(crate) fn sealed(&self, session: &Session) -> Session {
+        let mut sealed = session.clone();
+        for (k, hash) in &self.frames {
+            sealed.frames[*k].sha256 = Some(hash.clone());
+        }
+        sealed
+    }
+
+    /// The error of reading a sealed capture session: a frame without a hash of its own was altered meanwhile.
+    pub(crate) fn error_of(&self, session: &Session, error: SolveError) -> SolveError {
+        match error {
+            SolveError::Session(SessionError::FrameAltered { path, .. })
+                if self
+                    .frames
+                    .iter()
+                    .any(|(k, _)| session.frame_path(&session.frames[*k]) == path) =>
+            {
+                SolveError::Changing { path }
+            }
+            error => error,
+        }
+    }
+
+    /// Sees that what was read since is what was hashed.
+    ///
+    /// # Errors
+    /// The first file that changed.
+    pub(crate) fn still_the_same(&self, session: &Session) -> Result<(), SolveError> {
+        for (path, input) in &self.named {
+            if sha256_of_file(path)? != input.sha256 {
+                return Err(SolveError::Changing { path: path.clone() });
+            }
+        }
+        // Read before it was hashed.
+        match Session::load(&session.folder)? == *session {
+            true => Ok(()),
+            false => Err(SolveError::Changing { path: session.manifest_path() }),
+        }
+    }
+
+    /// Hash of inputs and settings together: the program's version and the solve's revision, the settings, the manifest (which
+    /// holds the frames' hashes), frames whose hash it lacks, the calibration's files and the mask. Which maps are made is no
+    /// part of it: it does not change them.
+    pub(crate) fn key(&self, options: &Options) -> String {
+        let mut text = settings(options);
+        let named = self.named.iter().map(|(_, input)| (&input.name, &input.sha256));
+        for (name, hash) in named {
+            // Writing to a string cannot fail.
+            let _ = write!(text, "\n{name} {hash}");
+        }
+        for (k, hash) in &self.frames {
+            let _ = write!(text, "\nframe {k} {hash}");
+        }
+        sha256_hex(text.as_bytes())
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Everything besides the inputs that changes a map, by names that do not change with the code.
+fn settings(options: &Options) -> String {
+    let method = method_name(options.method);
+    let grid = match options.grid {
+        Grid::Sensor => "sensor",
+        Grid::Undistorted => "undistorted",
+    };
+    let normal_y = match options.normal_y {
+        NormalY::Up => "up",
+        NormalY::Down => "down",
+    };
+    let mask = if options.mask == MaskChoice::Found { "found" } else { "given" };
     // Who solves without being named must not matter; one that is asked for by name is to be asked.
-    if matches!(options.device, Device::Gpu) {
-        text.push_str(" gpu");
-    }
-    if options.residuals == Residuals::Write {
-        text.push_str(" residuals");
-    }
-    let unhashed = session.frames.iter().filter(|frame| frame.sha256.is_none());
-    let mut files = vec![session.manifest_path()];
-    files.extend(unhashed.map(|frame| session.frame_path(frame)));
-    files.extend(calibration_files(&calibration.folder)?);
-    files.extend(options.mask.file(session));
-    let hashes: Vec<Result<String, FileError>> =
-        files.par_iter().map(|path| sha256_of_file(path)).collect();
-    for hash in hashes {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "\n{}", hash?);
-    }
-    Ok(sha256_hex(text.as_bytes()))
+    let device = if matches!(options.device, Device::Gpu) { "gpu" } else { "any" };
+    let residuals = if options.residuals == Residuals::Write { "written" } else { "left" };
+    let scale = options.scale as usize;
+    format!(
+        "{PROGRAM}, solve {REVISION}: method {method}, grid {grid}, normal-y {normal_y}, scale {scale}, mask {mask}, device {device}, residuals {residuals}"
+    )
 }
 
 /// The calibration's files and its gain maps, by name.

@@ -4,6 +4,7 @@ use super::SolveError;
 use super::bands::Run;
 use super::device_memory::{Measured, Memory};
 use super::on_gpu::OnGpu;
+use super::run::method_name;
 use crate::gpu::Gpu;
 use crate::photometry::Method;
 use std::ops::Range;
@@ -106,7 +107,7 @@ pub(super) fn faster(run: &Run, memory: Option<&Path>) -> Chosen {
 /// What a measurement holds for, besides the machine.
 fn kind_of(run: &Run) -> String {
     let threads = rayon::current_num_threads();
-    format!("{:?}, {} lights, {threads} threads", run.method(), run.lights())
+    format!("{}, {} lights, {threads} threads", method_name(run.method()), run.lights())
 }
 
 /// Nanoseconds a photosite by the processor and by the graphics processor, transfers and what it leaves over included.

@@ -1,5 +1,6 @@
 //! What was measured of a graphics processor, remembered for the next run: a file among the user's cached ones.
 
+use super::current::REVISION;
 use crate::files::{PROGRAM, write_atomic};
 use crate::gpu::Adapter;
 use serde::{Deserialize, Serialize};
@@ -35,7 +36,8 @@ pub(super) struct Measured {
 
 impl Default for Memory {
     fn default() -> Self {
-        let program = PROGRAM.to_owned();
+        // Another revision may be faster on either.
+        let program = format!("{PROGRAM}, solve {REVISION}");
         Self { schema: SCHEMA, program, drivers: drivers(), measured: vec![] }
     }
 }

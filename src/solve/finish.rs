@@ -90,13 +90,13 @@ pub(super) fn convert(albedo: &mut Image<[f32; 3]>, matrix: &Matrix3<f64>) {
         .for_each(|rgb| *rgb = (matrix * nalgebra::Vector3::from(*rgb)).into());
 }
 
-/// Resamples one value a pixel, 0 where there is none, as [`undistort`] does.
+/// Resamples one value a pixel, NaN where there is none, as [`undistort`] does.
 pub(crate) fn undistort_values(values: &Image<f32>, camera: &Camera) -> Image<f32> {
     let (width, height) = (values.width, values.height);
     let projector = Projector::new(camera);
-    let known = values.data.par_iter().map(|value| if *value == 0.0 { 0 } else { 255 });
+    let known = values.data.par_iter().map(|value| if value.is_nan() { 0 } else { 255 });
     let known = Image { width, height, data: known.collect() };
-    let mut out = Image::filled(width, height, 0.0);
+    let mut out = Image::filled(width, height, f32::NAN);
     out.data.par_chunks_mut(width.max(1)).enumerate().for_each(|(v, row)| {
         for (u, value) in row.iter_mut().enumerate() {
             if let Some(taps) = taps_of_undistorted(&known, camera, &projector, [u, v]) {
@@ -196,7 +196,8 @@ impl Taps {
 
     fn mean_of(&self, value: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
         let mut sum = [0.0; 3];
-        for (at, weight) in self.at {
+        // What is unsolved has no share, and may hold anything.
+        for (at, weight) in self.at.into_iter().filter(|(_, weight)| *weight > 0.0) {
             let value = value(at);
             sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight * value);
         }

@@ -15,7 +15,7 @@ use weavelight_calibration::description::{Camera, Image};
 
 /// Takes rows of residuals, from several threads and in any order: position of the light among the scene's, row, one value
 /// a photosite of the frame. A residual is in units of the albedo, as a fraction of what a perfect white diffuser that
-/// faces the light would send back; 0 where there is none: unsolved, or the sample is clipped.
+/// faces the light would send back; NaN where there is none: unsolved, or the sample is clipped.
 pub type ResidualRows<'a> = &'a (dyn Fn(usize, usize, &[f32]) + Sync);
 
 /// Residuals of one light along a row: (y - albedo max(0, n . l)) / |l| with l the light vector, y the sample and the
@@ -37,7 +37,7 @@ pub(crate) fn residual_row(
             let predicted = f64::from(surface.albedo[column]) * normal.dot(&vector).max(0.0);
             let value = ((f64::from(signal[column]) - predicted) / vector.norm()) as f32;
             let known = is_solved(surface.outcome[column]) && value.is_finite();
-            *residual = if known { value } else { 0.0 };
+            *residual = if known { value } else { f32::NAN };
         }
     }
 }
@@ -47,19 +47,23 @@ pub(crate) struct ResidualFiles {
     folder: PathBuf,
     lights: Vec<usize>,
     rows: Vec<ExrRows>,
+    /// Whether the files are resampled at the end, and until then keep NaN where there is no residual.
+    resampled: bool,
     failure: OnceLock<FileError>,
 }
 
 impl ResidualFiles {
-    /// Starts the files of these lights (their numbers in the rig).
+    /// Starts the files of these lights (their numbers in the rig); `resampled` where [`ResidualFiles::finish`] will be given
+    /// a camera.
     pub(crate) fn create(
         folder: &Path,
         lights: Vec<usize>,
         size_px: [usize; 2],
+        resampled: bool,
     ) -> Result<Self, FileError> {
         let start = |light: &usize| ExrRows::create(&folder.join(residual_exr(*light)), size_px);
         let rows = lights.iter().map(start).collect::<Result<_, _>>()?;
-        Ok(Self { folder: folder.to_owned(), lights, rows, failure: OnceLock::new() })
+        Ok(Self { folder: folder.to_owned(), lights, rows, resampled, failure: OnceLock::new() })
     }
 
     /// Writes a row; a failure is kept for [`ResidualFiles::finish`].
@@ -67,7 +71,11 @@ impl ResidualFiles {
         if self.failure.get().is_some() {
             return;
         }
-        if let Err(error) = self.rows[light].write_row(y, values) {
+        let written = match self.resampled {
+            true => self.rows[light].write_row(y, values),
+            false => self.rows[light].write_row(y, &zero_where_missing(values)),
+        };
+        if let Err(error) = written {
             // Another thread may have been first; one failure says enough.
             let _ = self.failure.set(error);
         }
@@ -95,11 +103,18 @@ impl ResidualFiles {
     }
 }
 
+/// As the format has it.
+fn zero_where_missing(values: &[f32]) -> Vec<f32> {
+    values.iter().map(|value| if value.is_nan() { 0.0 } else { *value }).collect()
+}
+
 fn undistort_file(path: &Path, camera: &Camera) -> Result<(), SolveError> {
     let unreadable = |error| FileError::read(path, std::io::Error::other(error));
     let exr = read_exr(path).map_err(unreadable)?;
     let (width, height) = (exr.width, exr.height);
     let data = exr.channel("Y").unwrap_or_default().to_vec();
-    write_exr_y(path, &undistort_values(&Image { width, height, data }, camera))?;
+    let mut resampled = undistort_values(&Image { width, height, data }, camera);
+    resampled.data = zero_where_missing(&resampled.data);
+    write_exr_y(path, &resampled)?;
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The whole run, from folders to a folder.
 
 use super::SolveError;
-use super::current::{key, still_current};
+use super::current::{Inputs, still_current};
 use super::encode::write_maps;
 use super::finish::{
     Finished, color_space, finish, leave_out_what_is_not_finite, pinhole, undistort,
@@ -9,7 +9,7 @@ use super::finish::{
 use super::in_memory::{
     SolvedScene, leave_out_what_adds_nothing, solve_scene_on, solve_scene_with_residuals,
 };
-use super::load::{Loaded, load};
+use super::load::{Loaded, load, unverified};
 use super::maps::Counts;
 use super::options::{Grid, MaskChoice, Options, Outputs, Residuals, Reuse};
 use super::preview::Scale;
@@ -17,10 +17,8 @@ use super::progress::{Progress, Stage};
 use super::residual::ResidualFiles;
 use super::scene::{Exposure, Scene};
 use super::swatch::find_swatch;
-use crate::files::{Input, PROGRAM, SCHEMA, StagedFolder, sha256_of_file, write_atomic};
-use crate::instrument::{
-    CAMERA_FILE, COLOR_FILE, Calibration, DEFECTS_FILE, LIGHTS_FILE, MeasuredCamera, write_camera,
-};
+use crate::files::{PROGRAM, SCHEMA, StagedFolder, write_atomic};
+use crate::instrument::{CAMERA_FILE, Calibration, MeasuredCamera, write_camera};
 use crate::machine::Pool;
 use crate::photometry::{Method, Outcome};
 use crate::raw::preview;
@@ -87,42 +85,42 @@ fn run_on_this_pool(
 ) -> Result<Solved, SolveError> {
     let watch = Stopwatch::start();
     let session = Session::load(&options.session)?;
+    // Hashed before it is read, and once more after that: what is read is what was hashed.
+    let inputs = Inputs::of(options, &session).or_else(|error| {
+        // A calibration that is missing or broken says so better.
+        Calibration::load(&options.calibration).map_err(SolveError::from)?;
+        Err(SolveError::from(error))
+    })?;
     let calibration = Calibration::load(&options.calibration)?;
     if options.grid == Grid::Undistorted && calibration.camera.is_none() {
         return Err(SolveError::NothingToUndistort { calibration: calibration.folder });
     }
-    let made_from = MadeFrom {
-        key: key(options, &session, &calibration)?,
-        inputs: inputs(&session, &calibration)?,
-    };
     let before = match options.reuse {
-        Reuse::IfCurrent => still_current(options, &made_from.key, &session, page.is_some()),
+        Reuse::IfCurrent => still_current(options, &inputs.key(options), &session, page.is_some()),
         Reuse::Never => None,
     };
     if let Some(report) = before {
         return Ok(Solved { report, up_to_date: true });
     }
-    let report = make(options, &session, calibration, made_from, watch, (progress, page))?;
+    let report = make(options, &session, calibration, &inputs, watch, (progress, page))?;
     Ok(Solved { report, up_to_date: false })
-}
-
-/// What the report says of the inputs.
-struct MadeFrom {
-    key: String,
-    inputs: Vec<Input>,
 }
 
 fn make(
     options: &Options,
     session: &Session,
     calibration: Calibration,
-    made_from: MadeFrom,
+    inputs: &Inputs,
     mut watch: Stopwatch,
     (progress, page): (&(dyn Fn(Progress) + Sync), Option<Page>),
 ) -> Result<Report, SolveError> {
     // Before the work: a place that cannot be written is told at once.
     let staged = StagedFolder::create(&options.out, OUTPUT)?;
-    let Loaded { mut scene, mut warnings } = load(options, session, calibration, progress)?;
+    let Loaded { mut scene, mut warnings } =
+        load(options, &inputs.sealed(session), calibration, progress)
+            .map_err(|error| inputs.error_of(session, error))?;
+    inputs.still_the_same(session)?;
+    warnings.extend(unverified(session));
     watch.lap(Stage::Read);
     warnings.extend(leave_out_what_adds_nothing(&mut scene)?);
     let mut swatch = None;
@@ -156,9 +154,9 @@ fn make(
     report.residuals = residuals.unwrap_or_default();
     report.warnings = warnings;
     report.device = Some(device);
-    report.inputs = made_from.inputs;
+    report.inputs = inputs.for_report();
     report.folders = Some(InputFolders::new(&options.session, &options.calibration));
-    report.key = Some(made_from.key);
+    report.key = Some(inputs.key(options));
     report.swatch = swatch;
     report.seconds = watch.seconds.clone();
     if let Some(page) = page {
@@ -185,7 +183,9 @@ fn solve_into(
         return Ok((solve_scene_on(scene, method, device, progress)?, None));
     }
     let lights = scene.lights.iter().map(|light| light.index).collect();
-    let files = ResidualFiles::create(staged.path(), lights, [scene.width, scene.height])?;
+    let size_px = [scene.width, scene.height];
+    let resampled = options.grid == Grid::Undistorted && scene.camera.is_some();
+    let files = ResidualFiles::create(staged.path(), lights, size_px, resampled)?;
     let write = |light: usize, y: usize, values: &[f32]| files.write_row(light, y, values);
     let solved = solve_scene_with_residuals(scene, method, device, &write, progress)?;
     Ok((solved, Some(files)))
@@ -350,17 +350,6 @@ fn mm_per_px(camera: &Camera, plane: &Plane) -> Option<f64> {
     let across = at(0.5, 0.0)? - at(-0.5, 0.0)?;
     let down = at(0.0, 0.5)? - at(0.0, -0.5)?;
     Some(across.cross(&down).norm().sqrt())
-}
-
-fn inputs(session: &Session, calibration: &Calibration) -> Result<Vec<Input>, SolveError> {
-    let files = [CAMERA_FILE, COLOR_FILE, DEFECTS_FILE, LIGHTS_FILE];
-    let files = files.map(|name| calibration.folder.join(name));
-    let files = std::iter::once(session.manifest_path()).chain(files).filter(|path| path.exists());
-    let input = |path: std::path::PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Input { name, sha256: sha256_of_file(&path)? })
-    };
-    files.map(input).collect()
 }
 
 /// Seconds per stage.

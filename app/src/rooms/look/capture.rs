@@ -9,7 +9,7 @@ use weavelight::instrument::LIGHTS_FILE;
 use weavelight::photometry::Method;
 use weavelight::raster::read_mask;
 use weavelight::session::{MANIFEST, Session};
-use weavelight::solution::Report;
+use weavelight::solution::{MASK_INPUT, Report};
 use weavelight::solve::method_of;
 use weavelight_calibration::description::Image;
 
@@ -117,7 +117,10 @@ fn find_calibration(folder: &Path, place: Option<&Place>, report: &Report) -> Op
     let of_its_rig = rig_of(folder).map(|rig| rig.join("calibration"));
     let folders = [told, place.map(Place::calibration), of_its_rig].into_iter().flatten();
     best(folders, &mut |folder: PathBuf| {
-        let mut of_calibration = report.inputs.iter().filter(|input| input.name != MANIFEST);
+        let mut of_calibration = report
+            .inputs
+            .iter()
+            .filter(|input| input.name != MANIFEST && !input.name.starts_with(MASK_INPUT));
         let fits = of_calibration.all(|input| is_input(&folder, &input.name, &report.inputs));
         folder.join(LIGHTS_FILE).exists().then_some(Found { folder, what: (), fits })
     })
