@@ -1,6 +1,7 @@
 //! Whether frames, lights and camera belong together and say enough.
 
 use super::SolveError;
+use super::copies::few;
 use super::field::LightField;
 use super::scene::Scene;
 use super::sensor::{Reading, intensity_of_places};
@@ -10,6 +11,8 @@ use nalgebra::{DMatrix, Vector3};
 
 /// From here on the light vectors are taken to lie in a plane: noise grows by this factor.
 const DEPENDENT_CONDITION: f64 = 5e3;
+/// Places along each side of the frame at which lights are seen to stand above the plane.
+const PLACES: usize = 9;
 /// From here on a warning is due (a ring of lights at 80 degrees of elevation has 8).
 const POOR_CONDITION: f64 = 50.0;
 
@@ -108,7 +111,7 @@ pub(crate) fn check_light_field(
     let places = nine_places(scene.size_px());
     let vectors: Vec<Vec<Vector3<f64>>> =
         places.iter().filter_map(|&pixel| field.exact(pixel)).collect();
-    let mut warnings = behind_the_surface(scene, &vectors);
+    let mut warnings = lights_below(scene, field)?;
     let conditions: Vec<f64> = vectors.iter().map(|vectors| condition(vectors)).collect();
     let best = conditions.iter().copied().fold(f64::INFINITY, f64::min);
     let worst = conditions.iter().copied().fold(0.0, f64::max);
@@ -120,32 +123,55 @@ pub(crate) fn check_light_field(
         });
     }
     if worst > POOR_CONDITION {
-        warnings.push(poor(worst));
+        let names: Vec<String> = scene.lights.iter().map(|light| light.index.to_string()).collect();
+        warnings.push(format!(
+            "The vectors of lights {} nearly lie in one plane (condition number {worst:.0}): expect normals with about {:.0} \
+             times the noise across that plane; spread the lights out.",
+            few(names),
+            worst / 2.0
+        ));
     }
     Ok(warnings)
 }
 
-fn poor(worst: f64) -> String {
-    format!(
-        "The light vectors nearly lie in one plane (condition number {worst:.0}): expect normals with about {:.0} times the \
-         noise across that plane; spread the lights out.",
-        worst / 2.0
-    )
-}
-
-/// Lights that shine on the back of the surface, wherever in the frame: a sheet is tilted away from them, or their place is
-/// wrong.
-fn behind_the_surface(scene: &Scene, places: &[Vec<Vector3<f64>>]) -> Vec<String> {
-    let behind = |k: usize| places.iter().all(|vectors| scene.plane.normal.dot(&vectors[k]) <= 0.0);
-    let lights = (0..scene.lights.len()).filter(|k| !places.is_empty() && behind(*k));
-    let warn = |k: usize| {
+/// Lights that stand at or below the plane at part of the frame; these and spots that point away give no light there.
+///
+/// # Errors
+/// Where three lights that stand above it are nowhere to be found.
+fn lights_below(scene: &Scene, field: &LightField) -> Result<Vec<String>, SolveError> {
+    let (width, height) = scene.size_px();
+    let shares = (0..PLACES).map(|k| k as f64 / (PLACES - 1) as f64);
+    let places = shares.clone().flat_map(|y| {
+        shares.clone().map(move |x| [x * (width - 1) as f64, y * (height - 1) as f64])
+    });
+    let (mut below, mut all, mut most_above) = (vec![0; scene.lights.len()], 0, 0);
+    for vectors in places.filter_map(|pixel| field.exact(pixel)) {
+        let above = |vector: &Vector3<f64>| vector.dot(scene.plane.normal.as_ref()) > 0.0;
+        below.iter_mut().zip(&vectors).for_each(|(count, v)| *count += usize::from(!above(v)));
+        most_above = most_above.max(vectors.iter().filter(|v| above(v)).count());
+        all += 1;
+    }
+    let name = |k: usize| scene.lights[k].index.to_string();
+    let low: Vec<usize> = (0..below.len()).filter(|&k| below[k] > 0).collect();
+    if most_above < 3 && all > 0 {
+        let names = few(low.iter().map(|&k| name(k)).collect());
+        return Err(SolveError::DependentLights {
+            calibration: scene.origin.calibration.clone(),
+            what: format!("lights {names} stand at or below the plane of the swatch"),
+        });
+    }
+    let sentence = |&k: &usize| {
+        let (percent, light) = (100.0 * below[k] as f64 / all as f64, name(k));
+        if below[k] == all {
+            return format!(
+                "Light {light} is behind the surface everywhere in the frame: correct its place in lights.toml, or [plane] in session.toml."
+            );
+        }
         format!(
-            "Light {} is behind the surface everywhere in the frame: correct its place in lights.toml, or [plane] in \
-             session.toml.",
-            scene.lights[k].index
+            "Light {light} stands at or below the plane of the swatch, or points away from it, over {percent:.0} % of the frame, where it adds nothing; check lights.toml and [plane]."
         )
     };
-    lights.map(warn).collect()
+    Ok(low.iter().map(sentence).collect())
 }
 
 fn nine_places((width, height): (usize, usize)) -> Vec<[f64; 2]> {

@@ -1,5 +1,6 @@
 //! Whether a light that was photographed twice stayed the same.
 
+use super::copies::{is_same_picture, name};
 use super::scene::{Exposure, Scene};
 use super::sensor::Reading;
 
@@ -12,10 +13,19 @@ const SAMPLES: usize = 200;
 
 /// Compares every drift-check frame with the light's frame in the solve.
 pub(crate) fn drift_warnings(scene: &Scene, drift: &[(Option<usize>, Exposure)]) -> Vec<String> {
-    drift.iter().filter_map(|(light, repeated)| drift_warning(scene, (*light)?, repeated)).collect()
+    drift.iter().filter_map(|(light, repeated)| drift_warning(scene, *light, repeated)).collect()
 }
 
-fn drift_warning(scene: &Scene, light: usize, repeated: &Exposure) -> Option<String> {
+fn drift_warning(scene: &Scene, light: Option<usize>, repeated: &Exposure) -> Option<String> {
+    let original = scene.exposures().find(|taken| is_same_picture(&taken.frame, &repeated.frame));
+    if let Some(original) = original {
+        return Some(format!(
+            "{} is a copy of {}, the same picture: it cannot show whether a light drifted; take it again.",
+            name(repeated),
+            name(original)
+        ));
+    }
+    let light = light?;
     let first = scene.lights.iter().find(|photographed| photographed.index == light)?;
     let apart = |e: &&Exposure| (e.seconds_at_iso_100() / repeated.seconds_at_iso_100()).ln().abs();
     let first = first.exposures.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
@@ -28,10 +38,6 @@ fn drift_warning(scene: &Scene, light: usize, repeated: &Exposure) -> Option<Str
             name(repeated)
         )
     })
-}
-
-fn name(exposure: &Exposure) -> String {
-    exposure.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Median over the frame of the second exposure's light relative to the first's; `None` where too little is bright.

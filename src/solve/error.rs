@@ -52,6 +52,46 @@ pub enum SolveError {
         /// Lights with a frame.
         found: usize,
     },
+    /// Frames that are copies of one another.
+    #[error("{}: {what} {left} light{} with a picture of {} own {} left, and a solve needs three", .session.display(), if *.left == 1 { "" } else { "s" }, if *.left == 1 { "its" } else { "their" }, if *.left == 1 { "is" } else { "are" })]
+    Copies {
+        /// The manifest.
+        session: PathBuf,
+        /// Which, as a sentence.
+        what: String,
+        /// Lights that remain.
+        left: usize,
+    },
+    /// Frames that nothing can be solved from.
+    #[error("{}: {what}; is every LED on, the lens cap off, exposure_s long enough and the black level in color.toml right? Photograph the swatch again", .session.display())]
+    NoSignal {
+        /// The manifest.
+        session: PathBuf,
+        /// What the frames show instead.
+        what: String,
+    },
+    /// An ambient frame that is none.
+    #[error("{} is brighter than {what}: is it the frame of a light, or is its exposure_s wrong? Take it again with every LED off, correct it, or remove its [[frames]] entry", .path.display())]
+    BrightAmbient {
+        /// The frame.
+        path: PathBuf,
+        /// "every frame", or which.
+        what: String,
+    },
+    /// Lights whose frames clip wherever the swatch is.
+    #[error("{}: {what} clipped everywhere, and fewer than three lights are left; take shorter exposures", .session.display())]
+    Clipped {
+        /// The manifest.
+        session: PathBuf,
+        /// As in "lights 0 and 1 are".
+        what: String,
+    },
+    /// An input that changed between its hash and its reading.
+    #[error("{}: it changed while it was being read; run it again when nothing writes there", .path.display())]
+    Changing {
+        /// The file.
+        path: PathBuf,
+    },
     /// The light vectors span no volume.
     #[error("{}: {what}, so the third direction of the normals cannot be found; add a light that stands apart, or check lights.toml", .calibration.display())]
     DependentLights {

@@ -1,19 +1,28 @@
-//! Frames that add nothing: the same picture twice, and pictures that clip wherever anybody looks.
+//! Frames that add nothing: the same picture twice, pictures without light, and pictures that clip wherever anybody looks.
 
-use super::scene::{Exposure, PhotographedLight, Scene};
+use super::copies::{few, leave_out_copies, name};
+use super::dark::leave_out_dark_lights;
+use super::error::SolveError;
+use super::scene::{Exposure, Scene};
 use super::sensor::Reading;
 use weavelight_calibration::description::Image;
 
 /// The fewest lights that can be solved.
 const LEAST_LIGHTS: usize = 3;
 
-/// Leaves out repeated and wholly clipped frames, and lights of which nothing remains as long as three do; a sentence for
-/// each. Maps do not change by it, but that a picture counted twice would seem to be calmer than it is.
-pub(crate) fn leave_out_idle_frames(scene: &mut Scene) -> Vec<String> {
+/// Leaves out copies, dark lights and wholly clipped frames, and lights of which nothing remains; a sentence for each.
+///
+/// # Errors
+/// Where fewer than three lights remain.
+pub(crate) fn leave_out_idle_frames(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
+    let mut warnings = leave_out_copies(scene)?;
+    warnings.extend(leave_out_dark_lights(scene)?);
+    warnings.extend(leave_out_clipped(scene)?);
+    Ok(warnings)
+}
+
+fn leave_out_clipped(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
     let mut warnings = vec![];
-    for light in &mut scene.lights {
-        warnings.extend(forget_repeated(light));
-    }
     let idle: Vec<Vec<bool>> = scene
         .lights
         .iter()
@@ -31,39 +40,12 @@ pub(crate) fn leave_out_idle_frames(scene: &mut Scene) -> Vec<String> {
         }
     }
     let whole: Vec<bool> = idle.iter().map(|idle| !idle.contains(&false)).collect();
-    forget_lights(scene, &whole, &mut warnings);
-    warnings
-}
-
-fn name(exposure: &Exposure) -> String {
-    exposure.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    warnings.extend(forget_lights(scene, &whole)?);
+    Ok(warnings)
 }
 
 fn clipped_sentence(light: usize, exposure: &Exposure) -> String {
     format!("Light {light}: {} is clipped everywhere and was left out.", name(exposure))
-}
-
-/// Frames of one light with the same samples at the same exposure: copies, as no two pictures have the same noise.
-fn forget_repeated(light: &mut PhotographedLight) -> Vec<String> {
-    let mut warnings = vec![];
-    let mut kept: Vec<Exposure> = Vec::with_capacity(light.exposures.len());
-    for exposure in light.exposures.drain(..) {
-        let same = |other: &&Exposure| {
-            other.seconds_at_iso_100() == exposure.seconds_at_iso_100()
-                && other.frame.samples == exposure.frame.samples
-        };
-        match kept.iter().find(same) {
-            Some(other) => warnings.push(format!(
-                "Light {}: {} is a copy of {} and was left out.",
-                light.index,
-                name(&exposure),
-                name(other)
-            )),
-            None => kept.push(exposure),
-        }
-    }
-    light.exposures = kept;
-    warnings
 }
 
 /// Whether no photosite of the swatch has a usable sample. Stops at the first that has one.
@@ -77,17 +59,20 @@ fn clips_everywhere(scene: &Scene, exposure: &Exposure) -> bool {
     !(0..scene.height).any(|y| (0..scene.width).any(|x| inside(x, y) && usable(x, y)))
 }
 
-fn forget_lights(scene: &mut Scene, idle: &[bool], warnings: &mut Vec<String>) {
-    let mut left = scene.lights.len();
+fn forget_lights(scene: &mut Scene, idle: &[bool]) -> Result<Vec<String>, SolveError> {
+    let lights = scene.lights.iter().zip(idle).filter(|(_, idle)| **idle);
+    let clipped: Vec<String> = lights.map(|(light, _)| light.index.to_string()).collect();
+    if !clipped.is_empty() && scene.lights.len() - clipped.len() < LEAST_LIGHTS {
+        let are = if clipped.len() == 1 { ("light", "is") } else { ("lights", "are") };
+        return Err(SolveError::Clipped {
+            session: scene.origin.session.clone(),
+            what: format!("{} {} {}", are.0, few(clipped), are.1),
+        });
+    }
     let mut idle = idle.iter();
-    scene.lights.retain(|light| {
-        if idle.next() != Some(&true) {
-            return true;
-        }
-        let needed = left <= LEAST_LIGHTS;
-        left -= usize::from(!needed);
-        let fate = if needed { "; expose it shorter" } else { " and was left out" };
-        warnings.push(format!("Light {} is clipped everywhere{fate}.", light.index));
-        needed
-    });
+    scene.lights.retain(|_| idle.next() != Some(&true));
+    Ok(clipped
+        .iter()
+        .map(|light| format!("Light {light} is clipped everywhere and was left out."))
+        .collect())
 }

@@ -105,14 +105,14 @@ fn solve(
     Ok(SolvedScene { maps, warnings, device })
 }
 
-/// Leaves out frames that repeat another or clip everywhere, and lights that stayed dark; warnings about these and about
-/// lights that contradict the others.
+/// Leaves out frames that are copies of another or clip everywhere, and lights that stayed dark; warnings about these and
+/// about lights that contradict the others.
 ///
 /// # Errors
-/// As [`solve_scene`].
+/// As [`solve_scene`]; and where fewer than three lights remain, or an ambient frame is brighter than the lit ones.
 pub fn leave_out_what_adds_nothing(scene: &mut Scene) -> Result<Vec<String>, SolveError> {
     check_frames(scene)?;
-    let mut warnings = leave_out_idle_frames(scene);
+    let mut warnings = leave_out_idle_frames(scene)?;
     let verdict = question(scene, &light_field(scene)?);
     let mut position = 0;
     scene.lights.retain(|_| {

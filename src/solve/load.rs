@@ -1,5 +1,6 @@
 //! From two folders to a scene in memory.
 
+use super::copies::few;
 use super::drift::drift_warnings;
 use super::in_memory::leave_out_what_adds_nothing;
 use super::options::MaskChoice;
@@ -131,6 +132,20 @@ fn photographed(session: &Session) -> Vec<usize> {
     lights.sort_unstable();
     lights.dedup();
     lights
+}
+
+/// Frames whose content nothing vouches for, told once.
+pub(super) fn unverified(session: &Session) -> Option<String> {
+    let without = session.frames.iter().filter(|frame| frame.sha256.is_none());
+    let names: Vec<String> = without.map(|frame| frame.file.display().to_string()).collect();
+    let (count, all) = (names.len(), session.frames.len());
+    let which =
+        if count == all { "no frame".to_owned() } else { format!("{count} of {all} frames") };
+    let has = if count == all { "has" } else { "have no" };
+    let names = if count == all { String::new() } else { format!(" ({})", few(names)) };
+    (count > 0).then(|| {
+        format!("session.toml: {which}{names} {has} a sha256; that they are as they were taken was not verified.")
+    })
 }
 
 fn unphotographed(session: &Session, calibration: &Calibration) -> Vec<String> {

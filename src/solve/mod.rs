@@ -5,8 +5,11 @@
 
 mod bands;
 mod blocks;
+mod brightness;
 mod check;
+mod copies;
 mod current;
+mod dark;
 mod device;
 mod device_memory;
 mod drift;

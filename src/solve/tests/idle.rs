@@ -102,24 +102,16 @@ fn only_the_swatch_says_whether_a_light_clips() {
     assert_eq!(make(&|place| place != 70 * 25 + 40), 10, "one sample is left");
 }
 
+/// Nothing can be solved then, and nothing is written.
 #[test]
-fn of_three_lights_none_is_left_out() {
-    let mut scene = scene(Recipe { lights: 3, ..Recipe::default() });
-    clip(&mut scene, 1, |_| true);
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
-    assert!(warnings.contains("Light 1 is clipped everywhere; expose it shorter."), "{warnings}");
-    assert_eq!(scene.lights.len(), 3);
-    assert_eq!(solve(&scene, Method::Auto).counts.solved(), 0);
-}
-
-/// A light that stayed dark: the maps are those of the others.
-#[test]
-fn a_dark_light_leaves_the_maps_of_the_others() {
-    let mut dark = scene(Recipe::default());
-    let mut without = dark.clone();
-    samples(&mut dark.lights[4].exposures[0]).iter_mut().for_each(|sample| *sample = 600);
-    without.lights.remove(4);
-    let warnings = leave_out_what_adds_nothing(&mut dark).unwrap().join("\n");
-    assert!(warnings.contains("Light 4 gives 0.0 %"), "{warnings}");
-    assert!(solve(&dark, Method::Auto) == solve(&without, Method::Auto));
+fn with_fewer_than_three_lights_that_do_not_clip_there_is_an_error() {
+    let check = |lights: usize, clipped: &[usize], expected: &str| {
+        let mut scene = scene(Recipe { lights, ..Recipe::default() });
+        clipped.iter().for_each(|&light| clip(&mut scene, light, |_| true));
+        let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("take shorter exposures"), "{error}");
+    };
+    check(3, &[1], "light 1 is clipped everywhere");
+    check(5, &[0, 2, 4], "lights 0, 2 and 4 are clipped everywhere");
+    check(4, &[0, 1, 2, 3], "lights 0, 1, 2 and 3 are clipped everywhere");
 }

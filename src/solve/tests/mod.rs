@@ -1,8 +1,12 @@
+mod copies;
+mod dark;
 mod folders;
+mod golden;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod idle;
 mod inspections;
+mod numbers;
 mod previews;
 mod reduced;
 mod residuals;
@@ -166,9 +170,13 @@ fn lights_that_contradict_the_others_are_named() {
         samples.iter_mut().for_each(|v| *v = 600 + (f64::from(*v - 600) * share) as u16);
     };
     check(&[], &[], &|_| {});
-    check(&["Light 4 gives 0.0 %", "left out"], &[4], &|scene| dim(scene, 4, 0.0));
+    check(&["Light 4 shows no signal above noise", "left out"], &[4], &|scene| dim(scene, 4, 0.0));
+    check(&["Light 4 gives 2.0 %", "left out"], &[4], &|scene| dim(scene, 4, 0.02));
     check(&["Light 7 gives 30 %"], &[], &|scene| dim(scene, 7, 0.3));
-    check(&["Light 1 gives 0.0 %", "Light 8 gives 0.0 %"], &[1, 8], &|scene| {
+    // An exposure that the manifest states by a factor of two off, either way.
+    check(&["Light 7 gives 50 %"], &[], &|scene| scene.lights[7].exposures[0].exposure_s *= 2.0);
+    check(&["Light 2 gives 200 %"], &[], &|scene| scene.lights[2].exposures[0].iso /= 2.0);
+    check(&["Lights 1 and 8 show no signal above noise"], &[1, 8], &|scene| {
         dim(scene, 1, 0.0);
         dim(scene, 8, 0.0);
     });
