@@ -181,6 +181,9 @@ impl App {
         if self.shown == Some(Room::Calibrate) {
             self.calibrate.leave(&mut self.desk);
         }
+        if open == Some(Room::Look) {
+            self.look.enter(&mut self.desk);
+        }
         if open == Some(Room::Scans) {
             self.scans.is_stale();
         }

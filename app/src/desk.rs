@@ -1,9 +1,11 @@
 //! What all rooms share: the rig that is open, what is going on, what went wrong, and what the rooms want done.
 
+use crate::names::Taken;
 use crate::place::Place;
-use crate::rooms::Room;
+use crate::rooms::{Room, look};
 use crate::settings::Settings;
 use crate::worker::Command;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use weavelight::files::one_line;
 
@@ -20,6 +22,10 @@ pub struct Desk {
     pub activity: Option<Activity>,
     /// What went wrong and nobody has put away yet; the newest last.
     pub problems: Vec<Problem>,
+    /// The names that scans of the rig have.
+    pub taken: Taken,
+    /// A solution is on its way to the Look room.
+    is_opening: bool,
     asked: Vec<Command>,
     brakes: Vec<Brake>,
 }
@@ -148,6 +154,8 @@ impl Desk {
             calibration_age_days: None,
             activity: None,
             problems: Vec::new(),
+            taken: Taken::default(),
+            is_opening: false,
             asked: Vec::new(),
             brakes: Vec::new(),
         }
@@ -187,6 +195,18 @@ impl Desk {
     /// Whether the worker has something to do that takes its time.
     pub fn is_busy(&self) -> bool {
         self.activity.is_some()
+    }
+
+    /// Opens a solution in the Look room.
+    pub fn look_at(&mut self, solution: PathBuf) {
+        self.is_opening = true;
+        self.ask(Command::Look(look::Ask::Open(solution)));
+        self.go_to(Room::Look);
+    }
+
+    /// Whether a solution was asked for that the Look room is to show, once.
+    pub fn take_opening(&mut self) -> bool {
+        std::mem::take(&mut self.is_opening)
     }
 
     /// Opens another room.

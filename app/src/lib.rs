@@ -19,6 +19,7 @@ pub mod browse;
 pub mod clock;
 pub mod desk;
 pub mod keeper;
+pub mod names;
 pub mod number;
 pub mod paths;
 pub mod place;

@@ -1,7 +1,9 @@
 //! The folders of one rig: everything that belongs to it lies beside its `rig.toml`.
 
+use crate::names::Taken;
 use std::path::{Path, PathBuf};
 use weavelight::instrument::{Calibration, Rig};
+use weavelight::solution::{REPORT_JSON, Report};
 
 /// Name of the rig's file.
 pub const RIG_FILE: &str = "rig.toml";
@@ -57,15 +59,62 @@ impl Place {
         self.folder.join("scans")
     }
 
-    /// The capture session of that name.
-    pub fn scan(&self, name: &str) -> PathBuf {
-        self.scans().join(folder_name(name))
+    /// Solutions of swatches.
+    pub fn solutions(&self) -> PathBuf {
+        self.folder.join("solutions")
     }
 
-    /// The solution of a capture session.
-    pub fn solution(&self, scan: &Path) -> PathBuf {
-        self.folder.join("solutions").join(scan.file_name().unwrap_or_default())
+    /// The names that scans have; and solutions, since a new scan must not take the place of one whose scan is gone.
+    pub fn taken(&self) -> Taken {
+        Taken::read(&[self.scans(), self.solutions()])
     }
+
+    /// The solution of a capture session. That of a capture session from elsewhere never takes the place of another's: it is
+    /// numbered on.
+    pub fn solution(&self, scan: &Path) -> PathBuf {
+        let name = scan.file_name().unwrap_or_default();
+        let solution = self.solutions().join(name);
+        let ours = |scan: &Path| scan.parent().is_some_and(|parent| same(parent, &self.scans()));
+        if ours(scan) {
+            return solution;
+        }
+        let name = name.to_string_lossy().into_owned();
+        let numbered = (2..).map(|k| self.solutions().join(format!("{name}~{k}")));
+        let is_free = |path: &PathBuf| {
+            let of_a_scan = path.file_name().is_some_and(|name| self.scans().join(name).exists());
+            !of_a_scan && (!path.exists() || is_solution_of(path, scan))
+        };
+        std::iter::once(solution.clone()).chain(numbered).find(is_free).unwrap_or(solution)
+    }
+
+    /// Every solution of a capture session that lies among those of this rig, the newest last.
+    pub fn solutions_of(&self, scan: &Path) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.solutions()).into_iter().flatten().flatten();
+        let own = self.solution(scan);
+        let mut found: Vec<PathBuf> = entries
+            .map(|entry| entry.path())
+            .filter(|path| path.join(REPORT_JSON).exists())
+            .filter(|path| *path == own || is_solution_of(path, scan))
+            .collect();
+        let made = |path: &PathBuf| {
+            path.join(REPORT_JSON).metadata().and_then(|metadata| metadata.modified()).ok()
+        };
+        found.sort_by_key(made);
+        found
+    }
+}
+
+/// Whether a solution says that it was made from this capture session.
+fn is_solution_of(solution: &Path, scan: &Path) -> bool {
+    let report = Report::read(&solution.join(REPORT_JSON)).ok();
+    let folders = report.and_then(|report| report.folders);
+    folders.is_some_and(|folders| same(Path::new(&folders.session), scan))
+}
+
+/// Whether two paths are one folder.
+pub fn same(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    a == b || real(a).zip(real(b)).is_some_and(|(a, b)| a == b)
 }
 
 /// Age of a calibration's oldest part, days; `None` where none says when it was made.
@@ -74,25 +123,4 @@ pub fn age_days(calibration: &Calibration) -> Option<i64> {
     let parts = [of.camera.as_ref(), of.color.as_ref(), of.lights.as_ref()];
     let oldest = parts.into_iter().flatten().filter_map(|part| part.created).min()?;
     Some(jiff::Timestamp::now().duration_since(oldest).as_hours() / 24)
-}
-
-/// A swatch's name as a folder's: letters, digits, spaces and `-_.`; everything else becomes `-`.
-pub fn folder_name(name: &str) -> String {
-    let keep = |c: char| if c.is_alphanumeric() || " -_".contains(c) { c } else { '-' };
-    let folder: String = name.trim().chars().map(keep).collect();
-    if folder.is_empty() { "scan".to_owned() } else { folder }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_become_folders_that_stay_inside() {
-        let check = |name: &str, expected: &str| assert_eq!(folder_name(name), expected);
-        check("linen 4021", "linen 4021");
-        check(" ../x/y ", "---x-y");
-        check("", "scan");
-        check("Köper №7", "Köper №7".replace('№', "-").as_str());
-    }
 }

@@ -109,6 +109,12 @@ impl Settings {
         self
     }
 
+    /// Where strokes of masks are kept until they are saved.
+    pub fn drafts(&self) -> PathBuf {
+        let beside = self.file.as_ref().and_then(|file| file.parent());
+        beside.unwrap_or(&self.home).join("drafts")
+    }
+
     /// Where the settings are that could not be read.
     pub fn put_aside(&self) -> Option<&Path> {
         self.put_aside.as_deref()

@@ -140,6 +140,35 @@ pub mod rig {
     /// In place of a place.
     pub const FAR: &str = "far away";
 
+    /// A scan that belongs to no rig.
+    pub fn scan_without_rig(scan: &std::path::Path) -> String {
+        format!("{} is a scan; open the rig that it was taken with first", scan.display())
+    }
+
+    /// A capture session that is not solved.
+    pub fn target(folder: &std::path::Path) -> String {
+        format!(
+            "{} is a capture session of a calibration target; open its rig, and use it in the Calibrate room",
+            folder.display()
+        )
+    }
+
+    /// A calibration without its rig.
+    pub fn calibration(folder: &std::path::Path) -> String {
+        format!(
+            "{} is a calibration without a rig; choose the folder that holds rig.toml",
+            folder.display()
+        )
+    }
+
+    /// Nothing that the program knows.
+    pub fn unknown(path: &std::path::Path) -> String {
+        format!(
+            "{} is no rig (rig.toml), scan (session.toml) or solution (report.json); drop one of their folders",
+            path.display()
+        )
+    }
+
     /// Where the rig was that was open last.
     pub fn gone(rig: &std::path::Path) -> String {
         let rig = rig.display();
@@ -295,7 +324,12 @@ pub mod scan {
     /// Scans the same again.
     pub const REPEAT: &str = "Scan again";
     /// What becomes of the old one.
-    pub const REPEAT_HINT: &str = "The scan just taken goes to the bin";
+    pub const REPEAT_HINT: &str =
+        "The scan shown here and its maps go to the bin; Undo brings them back";
+    /// Brings it back.
+    pub const UNDO: &str = "Undo";
+    /// Makes the maps of a scan that has none.
+    pub const SOLVE: &str = "Solve it";
     /// Clears the table.
     pub const NEXT: &str = "Next swatch";
     /// Work.
@@ -307,7 +341,7 @@ pub mod scan {
     /// Work.
     pub const LAYING_OUT: &str = "Laying out the fabric";
     /// Work.
-    pub const THROWING_AWAY: &str = "Moving the scan to the bin";
+    pub const BRINGING_BACK: &str = "Bringing the earlier scan back";
     /// Layers of the maps.
     pub const LAYERS: [&str; 3] = ["Relit", "Normals", "Albedo"];
     /// The maps, for those who do not see them.
@@ -358,7 +392,21 @@ pub mod scan {
 
     /// A scan that was stopped.
     pub fn unfinished(name: &str, frames: usize) -> String {
-        format!("“{name}” was stopped after {frames} frames. Continue where it stood?")
+        let after = match frames {
+            1 => "one frame".to_owned(),
+            frames => format!("{frames} frames"),
+        };
+        format!("“{name}” was stopped after {after}. Continue where it stood?")
+    }
+
+    /// A scan that was taken again.
+    pub fn replaced(name: &str) -> String {
+        format!("The other scan of “{name}” is in the bin.")
+    }
+
+    /// A scan that was here before.
+    pub fn brought_back(name: &str) -> String {
+        format!("“{name}” is back")
     }
 
     /// A frame's place in the strip, in words.
@@ -428,8 +476,11 @@ pub mod scans {
     pub const SOLVE: &str = "Solve";
     /// Where there is one.
     pub const SOLVE_AGAIN: &str = "Solve again";
-    /// Into the bin.
-    pub const DELETE: &str = "Delete";
+    /// Nothing to solve.
+    pub const UP_TO_DATE: &str =
+        "Up to date: it was solved from the same frames and calibration with the same settings.";
+    /// Solve it nevertheless.
+    pub const SOLVE_ALL_THE_SAME: &str = "Solve it all the same";
     /// What that means.
     pub const DELETE_HINT: &str =
         "Frames and maps go to the system's bin, from where they can be restored";
@@ -445,6 +496,11 @@ pub mod scans {
     pub const EXPORTING: &str = "Exporting";
     /// Work.
     pub const DELETING: &str = "Deleting the scan";
+
+    /// Into the bin.
+    pub fn delete(name: &str) -> String {
+        format!("Delete “{name}”")
+    }
 
     /// A search without result.
     pub fn nothing_found(search: &str) -> String {

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot set its table up has failed")]
 
 mod desk;
+mod losses;
 mod shell;
 mod wizard;
 
@@ -285,7 +286,7 @@ fn scans_are_searched_solved_exported_and_deleted() {
     window.idle();
     let exported = window.home().join("exports/silk 12 maps");
     assert!(exported.join("normal.exr").exists());
-    window.click("Delete");
+    window.click("Delete “silk 12”");
     window.idle();
     assert!(!window.rig().join("scans/silk 12").exists());
     window.click("Undo");
@@ -293,7 +294,7 @@ fn scans_are_searched_solved_exported_and_deleted() {
     assert!(window.rig().join("scans/silk 12/session.toml").exists());
     assert!(window.rig().join("solutions/silk 12/normal.exr").exists());
     assert!(window.harness.query_by_label("Undo").is_none());
-    window.click("Delete");
+    window.click("Delete “silk 12”");
     window.idle();
     assert!(!window.rig().join("scans/silk 12").exists());
     assert!(!window.rig().join("solutions/silk 12").exists());

@@ -117,11 +117,45 @@ pub const NONE: &str = "Leave all out";
 pub const SAVE_AND_SOLVE: &str = "Save and solve again";
 pub const PAINT_FIRST: &str = "Paint what is to be solved first.";
 pub const NO_MASK: &str = "A mask belongs to the frames, and these are not here.";
+pub const KEPT_ALREADY: &str = "That changed nothing: it is kept already. Choose Leave out.";
+pub const LEFT_OUT_ALREADY: &str = "That changed nothing: it is left out already. Choose Keep.";
+pub const DRAFT_IS_BACK: &str =
+    "strokes that were not saved are back; save them, or take them back with Undo";
+pub const KEEPING_STROKES: &str = "Keeping unsaved strokes";
+pub const SHOW_IT: &str = "Show it";
+pub const SOLVE_IT: &str = "Solve it";
+pub const NOT_NOW: &str = "Not now";
+pub const PIN: &str = "Stay with this one";
+pub const PIN_HINT: &str = "It stays when another scan is solved";
+pub const OPENING_FOLDER: &str = "Opening the folder";
 pub const SAVING_MASK: &str = "Saving the mask";
 pub const READING_FRAMES: &str = "Reading the frames";
 
 pub fn opening(name: &str) -> String {
     format!("Opening {name}")
+}
+
+pub fn newer(name: &str) -> String {
+    format!("“{name}” is solved.")
+}
+
+pub fn unsolved(name: &str) -> String {
+    format!("“{name}” is a scan that is not solved yet.")
+}
+
+pub fn not_solved(scan: &Path) -> String {
+    format!("{} is a scan that is not solved yet; solve it first", scan.display())
+}
+
+pub fn is_target(folder: &Path) -> String {
+    format!(
+        "{} is a capture session of a calibration target, which has no maps; choose a solution or a scan",
+        folder.display()
+    )
+}
+
+pub fn is_calibration(folder: &Path) -> String {
+    format!("{} is a calibration; choose a solution or a scan", folder.display())
 }
 
 pub fn solving(name: &str) -> String {

@@ -4,9 +4,11 @@
 //! Work that the user no longer wants is ended by unwinding from its progress callback, as rust-analyzer ends its queries:
 //! the library's outputs appear only when whole, so nothing half-written stays.
 
+pub mod bin;
 pub mod instruments;
 mod job;
 pub mod open;
+pub(crate) mod what;
 
 pub use job::{Ended, Outbox};
 
@@ -79,6 +81,7 @@ impl Command {
     fn only_reads(&self) -> bool {
         match self {
             Command::Rig(ask) => matches!(ask, rig::Ask::ReadCalibration(_)),
+            Command::Look(ask) => matches!(ask, look::Ask::Draft(_)),
             Command::Scans(ask) => {
                 matches!(ask, scans::Ask::List(_) | scans::Ask::Thumbnail(..))
             }
@@ -201,8 +204,8 @@ impl Worker {
 fn act(command: Command, tools: &mut Tools, out: &Outbox) {
     let out = &out.of(command.area());
     match command {
-        Command::Open(folder) => open::open(&folder, tools, out),
-        Command::Dropped(path) => open::dropped(path, tools, out),
+        Command::Open(path) => open::open_path(&path, tools, out),
+        Command::Dropped(path) => open::dropped(&path, tools, out),
         Command::MakeSimulatedRig(folder) => open::make_simulated(&folder, tools, out),
         Command::Rig(ask) => rig::act(ask, tools, out),
         Command::Calibrate(ask) => calibrate::act(ask, tools, out),

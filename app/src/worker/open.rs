@@ -1,17 +1,18 @@
 //! Opening a rig, and making a simulated one.
 
+use super::what::{What, is_open, rig_of};
 use super::{Outbox, Tools, Update};
 use crate::place::Place;
 use crate::rooms::{Room, look, scan};
 use crate::texts::rig as texts;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use weavelight::simulate;
 
 /// A quarter of the reference camera's size: the whole loop in minutes on a small computer.
 const SIZE_PX: [usize; 2] = [1232, 816];
 
 /// Opens the rig in `folder`. Board and camera of the one before are let go.
-pub(super) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
+pub(crate) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
     match Place::open(folder) {
         Ok(place) => {
             tools.instruments = None;
@@ -37,17 +38,45 @@ pub(super) fn make_simulated(folder: &Path, tools: &mut Tools, out: &Outbox) {
     }
 }
 
-/// What a folder that was dropped is for is seen by what lies in it.
-pub(super) fn dropped(path: PathBuf, tools: &mut Tools, out: &Outbox) {
-    let has = |file: &str| path.join(file).exists();
-    if has(weavelight::solution::REPORT_JSON) {
-        out.tell(Update::GoTo(Room::Look));
-        look::act(look::Ask::Open(path), tools, out);
-    } else if has(weavelight::session::MANIFEST) {
-        out.tell(Update::GoTo(Room::Scan));
-        out.tell(Update::Scan(scan::Told::Dropped(path)));
-    } else {
-        open(&path, tools, out);
+/// What was dropped is used for what it is.
+pub(super) fn dropped(path: &Path, tools: &mut Tools, out: &Outbox) {
+    match What::is(path) {
+        What::Solution(folder) => {
+            out.tell(Update::GoTo(Room::Look));
+            look::act(look::Ask::Open(folder), tools, out);
+        }
+        What::Scan(scan) => {
+            if let (None, Some(rig)) = (&tools.place, rig_of(&scan)) {
+                open(&rig.folder, tools, out);
+            }
+            match tools.place {
+                Some(_) => {
+                    out.tell(Update::GoTo(Room::Scan));
+                    out.tell(Update::Scan(scan::Told::Dropped(scan)));
+                }
+                None => out.fail(texts::OPENING, &texts::scan_without_rig(&scan)),
+            }
+        }
+        What::Rig(folder) => open(&folder, tools, out),
+        What::Calibration(_, Some(rig)) => {
+            if !is_open(&rig, tools.place.as_ref()) {
+                open(&rig, tools, out);
+            }
+            out.tell(Update::GoTo(Room::Calibrate));
+        }
+        What::Target(folder) => out.fail(texts::OPENING, &texts::target(&folder)),
+        What::Calibration(folder, None) => out.fail(texts::OPENING, &texts::calibration(&folder)),
+        What::Other(path) => out.fail(texts::OPENING, &texts::unknown(&path)),
+    }
+}
+
+/// Opens what was chosen as a rig. Where it is something else that the program knows, that is used.
+pub(super) fn open_path(path: &Path, tools: &mut Tools, out: &Outbox) {
+    match What::is(path) {
+        What::Rig(folder) => open(&folder, tools, out),
+        // The rig's file is missed, by its path.
+        What::Other(path) => open(&path, tools, out),
+        _ => dropped(path, tools, out),
     }
 }
 

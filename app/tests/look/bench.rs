@@ -81,6 +81,11 @@ impl Bench {
         self.rig().join("solutions").join(SOLUTION)
     }
 
+    /// Where strokes are kept until they are saved.
+    pub(crate) fn drafts(&self) -> PathBuf {
+        self.folder.path().join("drafts")
+    }
+
     /// The Look room with nothing in it.
     pub(crate) fn empty(&self, size: [f32; 2], theme: egui::Theme) -> Window {
         self.window(size, theme, true)

@@ -1,6 +1,7 @@
 //! What is photographed, in which order.
 
 use super::ScanError;
+use super::store::is_of;
 use super::subject::{Pose, Subject};
 use crate::device::board::wire::LIGHTS_MAX;
 use crate::instrument::Rig;
@@ -128,6 +129,40 @@ impl Plan {
         }
     }
 
+    /// Further exposures of each light as the frames of a scan have them, relative to the scan's own: what [`Plan::new`] was
+    /// made with. Empty where there are none, or the frames are no scan's.
+    pub fn bracket_of(there: &[FrameEntry]) -> Vec<f64> {
+        let signal = |entry: &FrameEntry| entry.exposure_s * entry.iso;
+        let factor = |further: usize| {
+            there.iter().find_map(|entry| {
+                let light = entry.light?;
+                let is = |stem: String| {
+                    move |entry: &&FrameEntry| is_of(entry, &step(stem.clone(), Some(light)))
+                };
+                let own = there.iter().find(is(format!("light-{light:02}")))?;
+                let other =
+                    there.iter().find(is(format!("light-{light:02}-exposure-{further}")))?;
+                Some(signal(other) / signal(own))
+            })
+        };
+        (1..).map_while(factor).collect()
+    }
+
+    /// The frames that a scan of a swatch with `rig` still lacks, of which `there` are recorded; `None` where these are no
+    /// scan's, but were imported or simulated under other names.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn missing(rig: &Rig, there: &[FrameEntry]) -> Result<Option<Vec<Step>>, ScanError> {
+        let plan = Self::new(rig, &Self::bracket_of(there))?;
+        let known = |entry: &FrameEntry| plan.steps.iter().any(|step| is_of(entry, step));
+        if !there.iter().all(known) {
+            return Ok(None);
+        }
+        let lacks = |step: &Step| !there.iter().any(|entry| is_of(entry, step));
+        Ok(Some(plan.steps.into_iter().filter(lacks).collect()))
+    }
+
     /// Without the exposures that a camera which is set by hand cannot take; whether there were any.
     pub(super) fn without_other_exposures(mut self) -> (Self, bool) {
         let before = self.steps.len();
@@ -247,6 +282,41 @@ pub(super) mod tests {
         let subject = Subject::Board { board, pose: Pose::Free, light: 10 };
         let error = Plan::of(&reference_rig(), &subject, &[], &[]).unwrap_err().to_string();
         assert!(error.contains("--light is 10; the rig has lights 0 to 9"), "{error}");
+    }
+
+    #[test]
+    fn what_a_scan_lacks_follows_from_its_plan() {
+        let rig = reference_rig();
+        let frames = |bracket: &[f64]| -> Vec<FrameEntry> {
+            let plan = Plan::new(&rig, bracket).unwrap();
+            let entry = |step: &Step| FrameEntry {
+                drift_check: step.drift_check,
+                ..FrameEntry::new(
+                    format!("{}.nef", step.stem),
+                    step.light,
+                    0.1 * step.factor,
+                    100.0,
+                )
+            };
+            plan.steps.iter().map(entry).collect()
+        };
+        let lacks = |there: &[FrameEntry]| {
+            let missing = Plan::missing(&rig, there).unwrap();
+            missing.map(|steps| steps.into_iter().map(|step| step.stem).collect::<Vec<_>>())
+        };
+        assert_eq!(lacks(&frames(&[])), Some(Vec::new()));
+        assert_eq!(lacks(&[]).unwrap().len(), 12);
+        assert_eq!(lacks(&frames(&[])[..11]), Some(vec!["drift-check".to_owned()]));
+        let mut bracketed = frames(&[0.25, 4.0]);
+        assert_eq!(Plan::bracket_of(&bracketed), [0.25, 4.0]);
+        assert_eq!(lacks(&bracketed), Some(Vec::new()));
+        // Light 9 has one of its two further exposures, under the name of its second try.
+        bracketed[29].file = "light-09-exposure-1-take-2.nef".into();
+        bracketed.remove(30);
+        assert_eq!(lacks(&bracketed), Some(vec!["light-09-exposure-2".to_owned()]));
+        // A name that only looks like an exposure's, and pictures from elsewhere.
+        let elsewhere = [FrameEntry::new("long-exposure-7.tif", Some(0), 0.1, 100.0)];
+        assert_eq!(lacks(&elsewhere), None);
     }
 
     #[test]

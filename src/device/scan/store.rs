@@ -352,7 +352,7 @@ fn name_of(kind: Kind) -> &'static str {
     }
 }
 
-fn is_of(entry: &FrameEntry, step: &Step) -> bool {
+pub(super) fn is_of(entry: &FrameEntry, step: &Step) -> bool {
     let stem = entry.file.file_stem().unwrap_or_default().to_string_lossy();
     let stem = stem.split_once("-take-").map_or(&*stem, |(stem, _)| stem);
     stem == step.stem

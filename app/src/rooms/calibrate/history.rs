@@ -5,6 +5,7 @@ use super::task::Step;
 use crate::place::Place;
 use std::path::{Path, PathBuf};
 use weavelight::files::{FileError, copy_input, exchange};
+use weavelight::instrument::{CAMERA_FILE, COLOR_FILE, LIGHTS_FILE};
 
 /// Something that is kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -171,6 +172,31 @@ pub(super) fn restore(place: &Place, entry: &Entry) -> Result<Option<PathBuf>, F
     Ok(away)
 }
 
+/// Keeps a copy of the calibration in use before a fit replaces its part of it, unless the history has that part already.
+pub(super) fn keep_before(place: &Place, step: Step) -> Result<(), FileError> {
+    let Some(part) = part(step) else { return Ok(()) };
+    let read = |calibration: &Path| std::fs::read(calibration.join(part)).ok();
+    let Some(now) = read(&place.calibration()) else { return Ok(()) };
+    let kept = |entry: &Entry| {
+        read(&folder(place).join(&entry.name).join("calibration")).as_ref() == Some(&now)
+    };
+    if entries(place).iter().any(kept) {
+        return Ok(());
+    }
+    let entry = new_entry(place, Kept::Calibration)?;
+    copy(&place.calibration(), &entry.join("calibration"))
+}
+
+/// The file of a calibration that a step writes.
+fn part(step: Step) -> Option<&'static str> {
+    match step {
+        Step::Camera => Some(CAMERA_FILE),
+        Step::Color => Some(COLOR_FILE),
+        Step::Lights => Some(LIGHTS_FILE),
+        Step::Check => None,
+    }
+}
+
 fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
     std::fs::rename(from, to).map_err(|error| FileError::write(to, error))
 }
@@ -266,6 +292,28 @@ mod tests {
             put_away(&place, step).unwrap();
         }
         assert_eq!(entries(&place).len(), 3);
+    }
+
+    #[test]
+    fn a_fit_leaves_a_copy_of_what_it_writes_over() {
+        let home = tempfile::tempdir().unwrap();
+        let place = rig(home.path());
+        let lights = place.calibration().join(LIGHTS_FILE);
+        keep_before(&place, Step::Lights).unwrap();
+        assert!(entries(&place).is_empty(), "there is nothing yet");
+        write(&lights, "from elsewhere");
+        for _ in 0..2 {
+            keep_before(&place, Step::Lights).unwrap();
+            keep_before(&place, Step::Color).unwrap();
+            keep_before(&place, Step::Check).unwrap();
+        }
+        let [entry] = entries(&place).try_into().unwrap();
+        write(&lights, "fitted here");
+        restore(&place, &entry).unwrap();
+        assert_eq!(std::fs::read_to_string(&lights).unwrap(), "from elsewhere");
+        let [entry] = entries(&place).try_into().unwrap();
+        restore(&place, &entry).unwrap();
+        assert_eq!(std::fs::read_to_string(&lights).unwrap(), "fitted here");
     }
 
     #[test]

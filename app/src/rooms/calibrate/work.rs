@@ -18,7 +18,7 @@ use weavelight::device::scan::{
 };
 use weavelight::files::{FileError, Provenance, sha256_of_file};
 use weavelight::instrument::{Calibration, CameraKind, Rig};
-use weavelight::raw::{Frame, Hint, decode};
+use weavelight::raw::Frame;
 use weavelight::session::{Board, FrameEntry, MANIFEST, Session, Target};
 use weavelight::simulate::{Laid, Lying, lay};
 
@@ -353,7 +353,7 @@ fn put_aside(place: &Place, folder: &Path) -> Result<(), FileError> {
 }
 
 fn read(session: &Session, entry: &FrameEntry) -> Result<Frame, AnyError> {
-    Ok(decode(&session.read_frame(entry)?, &Hint::default())?)
+    Ok(session.frame(entry)?)
 }
 
 /// The fit of a step, the same call as the command line's.
@@ -361,6 +361,7 @@ fn fit(step: Step, place: &Place, out: &Outbox) -> Result<(), Ended> {
     let (rig, targets, calibration) = (place.rig_file(), place.targets(), place.calibration());
     let progress = |share: f64, what: &str| out.tick(share, what);
     let fitted = out.job(texts::fitting(step), || -> Result<(Report, Vec<String>), AnyError> {
+        history::keep_before(place, step)?;
         Ok(match step {
             Step::Camera => {
                 let sessions = vec![targets.join(BOARD)];

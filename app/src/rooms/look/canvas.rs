@@ -21,8 +21,10 @@ pub(super) struct Canvas {
     stroke: Vec<[f64; 2]>,
     /// Radius of the brush, pixels of the picture.
     pub(super) brush_px: f64,
-    /// Whether the stroke takes away.
-    pub(super) erases: bool,
+    /// Whether the stroke takes away; `None` until that is chosen, or something was painted.
+    erases: Option<bool>,
+    /// Why the last stroke changed nothing.
+    pub(super) without_effect: Option<&'static str>,
     overlay: Option<Overlay>,
     /// The pixel under the mouse.
     pub(super) hovered: Option<[usize; 2]>,
@@ -170,29 +172,45 @@ impl Look {
         self.profile = maps.zip(self.line).map(|(maps, line)| along(maps, line));
     }
 
+    /// Draws with the mouse; with the button let go, that is a step of the mask.
     fn paint(&mut self, shown: &Shown, size: [usize; 2]) {
-        let mask = self.opened.as_ref().and_then(|o| o.capture()).and_then(|c| c.mask.as_ref());
-        let painting = self.painting.get_or_insert_with(|| super::Painting::new(size, mask));
         let response = &shown.response;
-        let canvas = &mut self.canvas;
-        let pressed = response.is_pointer_button_down_on()
-            && shown.response.ctx.input(|input| input.pointer.primary_down());
-        if pressed {
-            if let Some(at) = shown.pixel_under_mouse() {
-                canvas.stroke.push(at);
-            }
-        } else if !canvas.stroke.is_empty() {
-            let stroke = std::mem::take(&mut canvas.stroke);
-            let changed = match self.tool {
-                Tool::Lasso => painting.lasso(&stroke, !canvas.erases),
-                _ => painting.brush(&stroke, canvas.radius_px(size), !canvas.erases),
-            };
-            if changed {
-                self.edits.changed_mask();
-            }
-        }
         if response.hovered() {
             response.ctx.set_cursor_icon(CursorIcon::Crosshair);
+        }
+        if self.awaits_draft {
+            return;
+        }
+        let mask = self.opened.as_ref().and_then(|o| o.capture()).and_then(|c| c.mask.as_ref());
+        self.painting.get_or_insert_with(|| super::Painting::new(size, mask));
+        if self.canvas.follow(shown) {
+            self.finish_stroke();
+        }
+    }
+
+    /// What was drawn so far is a step of the mask.
+    pub(super) fn finish_stroke(&mut self) {
+        let Some(painting) = &mut self.painting else { return };
+        let canvas = &mut self.canvas;
+        let stroke = std::mem::take(&mut canvas.stroke);
+        if stroke.is_empty() {
+            return;
+        }
+        let erases = canvas.erases(Some(painting));
+        canvas.set_erases(erases);
+        let mask = painting.mask();
+        let radius = canvas.radius_px([mask.width, mask.height]);
+        let changed = match self.tool {
+            Tool::Lasso => painting.lasso(&stroke, !erases),
+            _ => painting.brush(&stroke, radius, !erases),
+        };
+        canvas.without_effect = match (changed, erases) {
+            (true, _) => None,
+            (false, true) => Some(texts::LEFT_OUT_ALREADY),
+            (false, false) => Some(texts::KEPT_ALREADY),
+        };
+        if changed {
+            self.edits.changed_mask();
         }
     }
 
@@ -227,7 +245,8 @@ impl Look {
             canvas.stroke.iter().map(|at| viewport.screen_of(*at, shown.rect)).collect();
         let radius =
             (canvas.radius_px([painting.mask().width, 0]) * f64::from(viewport.zoom)) as f32;
-        let color = if canvas.erases { meaning::WARNING } else { meaning::ACTIVE };
+        let erases = canvas.erases(Some(painting));
+        let color = if erases { meaning::WARNING } else { meaning::ACTIVE };
         if self.tool == Tool::Brush {
             if let Some(at) = shown.response.hover_pos() {
                 ui.painter().circle_stroke(at, radius, Stroke::new(1.5, color));
@@ -379,6 +398,50 @@ impl Look {
 }
 
 impl Canvas {
+    /// Whether strokes take away: as chosen, else so that the first one changes something.
+    pub(super) fn erases(&self, painting: Option<&super::Painting>) -> bool {
+        self.erases.unwrap_or_else(|| painting.is_none_or(super::Painting::is_whole))
+    }
+
+    pub(super) fn set_erases(&mut self, erases: bool) {
+        self.erases = Some(erases);
+        self.without_effect = None;
+    }
+
+    /// Follows the first button through everything that happened since the last frame: where frames are slow, a whole stroke.
+    /// True when the button was let go.
+    fn follow(&mut self, shown: &Shown) -> bool {
+        let response = &shown.response;
+        let ctx = &response.ctx;
+        let first = egui::PointerButton::Primary;
+        let (events, down) =
+            ctx.input(|input| (input.events.clone(), input.pointer.button_down(first)));
+        let begins_here = |at: Pos2| {
+            let on_top = ctx.layer_id_at(at).is_none_or(|layer| layer == response.layer_id);
+            let free = ctx.dragged_id().is_none_or(|id| id == response.id);
+            shown.rect.contains(at) && on_top && free
+        };
+        let mut drawing = !self.stroke.is_empty();
+        for event in events {
+            let (at, ends) = match event {
+                egui::Event::PointerButton { pos, button, pressed, .. } if button == first => {
+                    drawing |= pressed && begins_here(pos);
+                    (pos, !pressed)
+                }
+                egui::Event::PointerMoved(pos) => (pos, false),
+                _ => continue,
+            };
+            if drawing {
+                self.stroke.push(shown.viewport.pixel_at(at, shown.rect));
+            }
+            if drawing && ends {
+                return true;
+            }
+        }
+        // It was let go while another room was drawn.
+        drawing && !down
+    }
+
     /// Radius of the brush: as set, else a fiftieth of the picture.
     pub(super) fn radius_px(&self, size: [usize; 2]) -> f64 {
         if self.brush_px > 0.0 { self.brush_px } else { (size[0] as f64 / 50.0).max(1.0) }

@@ -22,6 +22,8 @@ pub struct Capture {
     pub lights: Vec<usize>,
     /// What is inside, row by row, where a mask says so.
     pub mask: Option<Arc<Image<bool>>>,
+    /// What strokes of its mask are kept under until they are saved.
+    pub key: String,
     /// Whether capture session or calibration are not any more what the solution was made from.
     pub changed: bool,
 }
@@ -77,6 +79,7 @@ pub(super) fn capture_of(
     lights.dedup();
     Ok(Capture {
         mask: read.mask_path().and_then(|path| read_mask(&path).ok()).map(Arc::new),
+        key: super::drafts::key(&read),
         changed: !(session.fits && calibration.fits),
         sources: Sources { session: session.folder, calibration: calibration.folder, method },
         lights,

@@ -46,6 +46,16 @@ impl Edits {
         self.undone.retain(|edit| *edit != Edit::Mask);
     }
 
+    /// A mask has been taken up with as many steps that can be undone and redone; lines are older.
+    pub(super) fn begin_with(&mut self, [done, undone]: [usize; 2]) {
+        let count = |edits: &[Edit]| edits.iter().filter(|edit| **edit == Edit::Mask).count();
+        if [count(&self.done), count(&self.undone)] != [done, undone] {
+            self.forget_mask();
+            self.done.extend(std::iter::repeat_n(Edit::Mask, done));
+            self.undone.extend(std::iter::repeat_n(Edit::Mask, undone));
+        }
+    }
+
     fn did(&mut self, edit: Edit) {
         self.done.push(edit);
         self.undone.clear();

@@ -17,6 +17,10 @@ pub struct Painting {
     pub version: u64,
     /// Whether it differs from what is on the disk.
     pub changed: bool,
+    /// The change up to which unsaved strokes are kept.
+    pub(super) kept: u64,
+    /// Pixels that are left out.
+    left_out: usize,
 }
 
 /// What a step turned over: runs of pixels, row by row. Turned over again it is undone.
@@ -27,12 +31,43 @@ impl Painting {
     pub fn new(size: [usize; 2], mask: Option<&Arc<Image<bool>>>) -> Self {
         let fits = mask.filter(|mask| [mask.width, mask.height] == size);
         let mask = fits.map_or_else(|| Image::filled(size[0], size[1], true), |m| (**m).clone());
-        Self { mask, undone: Vec::new(), done: Vec::new(), version: 0, changed: false }
+        let left_out = mask.data.iter().filter(|inside| !**inside).count();
+        let (undone, done) = (Vec::new(), Vec::new());
+        Self { mask, undone, done, version: 0, changed: false, kept: 0, left_out }
     }
 
     /// The mask.
     pub fn mask(&self) -> &Image<bool> {
         &self.mask
+    }
+
+    /// Whether nothing is left out.
+    pub fn is_whole(&self) -> bool {
+        self.left_out == 0
+    }
+
+    /// Whether everything is.
+    pub fn is_empty(&self) -> bool {
+        self.left_out == self.mask.data.len()
+    }
+
+    /// How many steps can be undone, and redone.
+    pub(super) fn steps(&self) -> [usize; 2] {
+        [self.done.len(), self.undone.len()]
+    }
+
+    /// Another mask of the same size, as one step. True where that changes something.
+    pub(super) fn replace(&mut self, mask: &Image<bool>) -> bool {
+        if [mask.width, mask.height] != [self.mask.width, self.mask.height] {
+            return false;
+        }
+        let mut step = Step::new();
+        for y in 0..mask.height {
+            for (x, inside) in mask.row(y).iter().enumerate() {
+                self.set(y, [x as f64, x as f64], *inside, &mut step);
+            }
+        }
+        self.did(step)
     }
 
     /// Paints along a stroke (pixel coordinates) with a round brush. True where that changes something.
@@ -106,6 +141,7 @@ impl Painting {
                 continue;
             }
             self.mask.data[at] = inside;
+            self.left_out = if inside { self.left_out - 1 } else { self.left_out + 1 };
             match step.last_mut().filter(|run| run.end == at) {
                 Some(run) => run.end += 1,
                 None => step.push(at..at + 1),
@@ -128,7 +164,10 @@ impl Painting {
 
     fn turn_over(&mut self, step: &[Range<usize>]) {
         for run in step {
-            self.mask.data[run.clone()].iter_mut().for_each(|pixel| *pixel = !*pixel);
+            let pixels = &mut self.mask.data[run.clone()];
+            let were_out = pixels.iter().filter(|inside| !**inside).count();
+            pixels.iter_mut().for_each(|pixel| *pixel = !*pixel);
+            self.left_out = self.left_out + pixels.len() - 2 * were_out;
         }
         self.touch();
     }
@@ -180,7 +219,11 @@ mod tests {
     use super::*;
 
     fn outside(painting: &Painting) -> usize {
-        painting.mask().data.iter().filter(|inside| !**inside).count()
+        let counted = painting.mask().data.iter().filter(|inside| !**inside).count();
+        assert_eq!(painting.left_out, counted);
+        assert_eq!(painting.is_whole(), counted == 0);
+        assert_eq!(painting.is_empty(), counted == painting.mask().data.len());
+        counted
     }
 
     fn steps(painting: &Painting) -> [bool; 2] {
@@ -205,6 +248,22 @@ mod tests {
         painting.undo();
         painting.fill(true);
         assert_eq!((outside(&painting), steps(&painting)), (0, [true, false]));
+    }
+
+    #[test]
+    fn another_mask_is_one_step() {
+        let mut other = Painting::new([40, 30], None);
+        other.brush(&[[10.0, 10.0]], 3.0, false);
+        let mut painting = Painting::new([40, 30], None);
+        painting.fill(false);
+        assert!(painting.replace(other.mask()));
+        assert_eq!((outside(&painting), painting.steps()), (29, [2, 0]));
+        painting.undo();
+        assert_eq!((outside(&painting), painting.is_empty()), (40 * 30, true));
+        painting.redo();
+        assert!(!painting.replace(other.mask()), "the same");
+        assert!(!painting.replace(&Image::filled(30, 40, true)), "of another size");
+        assert_eq!(outside(&painting), 29);
     }
 
     /// Square of the distance from a point to a line of several points: the plain meaning of the brush.

@@ -4,12 +4,15 @@
 //! - `opened`: a solution off the disk; `capture`: the frames that it was solved from; `work`: the worker's part
 //! - `layer`: what can be shown; `lamp`: under which light
 //! - `canvas`: the maps with what is drawn over them, and the mouse; `legend`: scales
+//! - `follow`: which solution is looked at; `drafts`: strokes of a mask that were not saved yet
 //! - `side`: the panel beside them; `loupe`: the numbers of a photosite; `plots`: histogram and profile
 //! - [`slopes`], [`profile`], [`mask`]: the sums behind
 
 mod canvas;
 mod capture;
+mod drafts;
 mod edits;
+mod follow;
 mod lamp;
 mod layer;
 mod legend;
@@ -34,8 +37,10 @@ use crate::settings::SolveSettings;
 use crate::texts::look as texts;
 use crate::worker::{Command, Outbox, Tools};
 use crate::{paths, theme, widgets};
+use drafts::Drafts;
 use edits::Edits;
 use eframe::egui::{self, RichText};
+use follow::Follow;
 use lamp::Lamp;
 use layer::Layers;
 use mask::Painting;
@@ -60,9 +65,24 @@ pub enum Ask {
     /// Solve one photosite again: which lights does it rest on?
     Photosite(Sources, [usize; 2]),
     /// Save the mask of a capture session.
-    Mask(PathBuf, Box<Image<bool>>),
+    Mask(Sources, Stroked),
+    /// The strokes in a file that were not saved.
+    Draft(PathBuf),
+    /// Solve the capture session in this folder, which has no solution yet, and look at that.
+    SolveScan(PathBuf, SolveSettings),
     /// Solve again, into the solution's folder, and look at it.
     Solve(Sources, PathBuf, SolveSettings),
+}
+
+/// A mask as it is when it is saved.
+#[derive(Debug)]
+pub struct Stroked {
+    /// What is inside.
+    pub mask: Image<bool>,
+    /// Of which picture.
+    pub key: String,
+    /// Which of its changes was the last one.
+    pub version: u64,
 }
 
 /// What the worker tells this room.
@@ -100,8 +120,14 @@ pub enum Told {
         /// `None` where that failed.
         found: Option<Box<Photosite>>,
     },
-    /// The mask is on the disk.
-    MaskSaved,
+    /// The mask is on the disk: of this picture, with this last change.
+    MaskSaved(String, u64),
+    /// The strokes in a file, if there are some.
+    Draft(PathBuf, Option<Box<Image<bool>>>),
+    /// The solution of the last scan stands.
+    Newest(PathBuf),
+    /// A capture session that has no solution.
+    Unsolved(PathBuf),
 }
 
 /// What the mouse does.
@@ -138,6 +164,10 @@ pub struct Look {
     profile: Option<profile::Profile>,
     painting: Option<Painting>,
     edits: Edits,
+    drafts: Drafts,
+    /// Whether it is not known yet what an earlier window left.
+    awaits_draft: bool,
+    follow: Follow,
     path: String,
     /// A path is to be written next.
     path_is_next: bool,
@@ -170,6 +200,7 @@ struct Taken {
 impl Look {
     /// Draws the room.
     pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        self.offers(ui, desk);
         if self.opened.is_none() {
             return self.nothing_yet(ui, desk);
         }
@@ -185,6 +216,7 @@ impl Look {
         let frame = egui::Frame::new().inner_margin(0);
         egui::CentralPanel::default().frame(frame).show(ui, |ui| self.maps(ui, desk));
         self.await_layers(desk);
+        self.keep_draft(desk);
     }
 
     /// Takes in what the worker tells.
@@ -209,10 +241,12 @@ impl Look {
                     taken.found = Some(found);
                 }
             }
-            Told::MaskSaved => {
-                if let Some(painting) = &mut self.painting {
-                    painting.changed = false;
-                }
+            Told::MaskSaved(key, version) => self.mask_saved(&key, version, desk),
+            Told::Draft(file, draft) => self.take_draft(file, draft.map(|draft| *draft), desk),
+            Told::Newest(solution) => self.newest(solution),
+            Told::Unsolved(scan) => {
+                self.follow.unsolved = Some(scan);
+                desk.go_to(Room::Look);
             }
         }
     }
@@ -220,39 +254,6 @@ impl Look {
     /// The solution that is looked at.
     pub fn opened(&self) -> Option<&Opened> {
         self.opened.as_deref()
-    }
-
-    /// A new solution. The same one solved again keeps how it is looked at, and what was drawn.
-    fn take(&mut self, opened: Box<Opened>, desk: &mut Desk) {
-        let old = std::mem::take(self);
-        let before = old.opened.as_ref().filter(|before| before.folder == opened.folder);
-        if before.is_some_and(|before| before.maps.size() == opened.maps.size()) {
-            self.view = old.view;
-            self.lamp = old.lamp;
-            self.layers = old.layers.of_one_solution();
-            (self.tool, self.canvas, self.line) = (old.tool, old.canvas, old.line);
-            (self.painting, self.edits) = (old.painting, old.edits);
-            self.keep_mask(&opened);
-        } else {
-            self.lamp.hang_over(&opened.maps.geometry);
-        }
-        self.opened = Some(opened);
-        self.measure();
-        if matches!(self.tool, Tool::Brush | Tool::Lasso) && !self.can_mask() {
-            self.tool = Tool::Hand;
-        }
-        desk.go_to(Room::Look);
-    }
-
-    /// The mask that was painted stays, with its steps, unless another one has taken its place.
-    fn keep_mask(&mut self, opened: &Opened) {
-        let of_disk = opened.capture().and_then(|capture| capture.mask.as_deref());
-        let stays = |painting: &mut Painting| {
-            painting.changed || of_disk.is_some_and(|mask| mask == painting.mask())
-        };
-        if self.painting.take_if(|painting| !stays(painting)).is_some() {
-            self.edits.forget_mask();
-        }
     }
 
     fn nothing_yet(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
@@ -343,6 +344,7 @@ impl Look {
                     self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
                         desk.ask(Command::Look(Ask::Open(folder)));
                     });
+                    ui.checkbox(&mut self.follow.pinned, texts::PIN).on_hover_text(texts::PIN_HINT);
                 });
                 let compare = widgets::menu(ui, texts::COMPARE_MENU, |ui| {
                     ui.set_min_width(menu_width(ui));

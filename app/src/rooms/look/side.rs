@@ -3,9 +3,10 @@
 use super::lamp::Kind;
 use super::layer::Layer;
 use super::view::Compose;
-use super::{Ask, Look, Tool, plots};
+use super::{Ask, Look, Opened, Stroked, Tool, plots};
 use crate::desk::Desk;
 use crate::number::{Number, Unit};
+use crate::settings::{MethodName, SolveSettings};
 use crate::texts::look as texts;
 use crate::widgets::{self, Sign};
 use crate::worker::Command;
@@ -205,9 +206,16 @@ impl Look {
 
     fn mask_section(&mut self, ui: &mut Ui, desk: &mut Desk) {
         named(ui, RichText::new(texts::MASK).strong(), |ui, _| {
-            ui.selectable_value(&mut self.canvas.erases, false, texts::KEEP);
-            ui.selectable_value(&mut self.canvas.erases, true, texts::LEAVE_OUT);
+            let mut erases = self.canvas.erases(self.painting.as_ref());
+            let keep = ui.selectable_value(&mut erases, false, texts::KEEP).clicked();
+            let leave_out = ui.selectable_value(&mut erases, true, texts::LEAVE_OUT).clicked();
+            if keep || leave_out {
+                self.canvas.set_erases(erases);
+            }
         });
+        if let Some(why) = self.canvas.without_effect {
+            ui.add(egui::Label::new(RichText::new(why).weak()).wrap());
+        }
         let Some(opened) = &self.opened else { return };
         let size = opened.maps.size();
         let mut radius = self.canvas.radius_px(size);
@@ -226,14 +234,14 @@ impl Look {
                 self.edits.changed_mask();
             }
         });
-        let something = painting.mask().data.contains(&true);
-        let ready = painting.changed && something && !desk.is_busy();
+        let ready = painting.changed && !painting.is_empty() && !desk.is_busy();
         let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
         if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
-            let (sources, mask) = (capture.sources.clone(), Box::new(painting.mask().clone()));
-            desk.ask(Command::Look(Ask::Mask(sources.session.clone(), mask)));
-            let folder = opened.folder.clone();
-            desk.ask(Command::Look(Ask::Solve(sources, folder, desk.settings.solve)));
+            let (sources, key) = (capture.sources.clone(), capture.key.clone());
+            let stroked = Stroked { mask: painting.mask().clone(), key, version: painting.version };
+            desk.ask(Command::Look(Ask::Mask(sources.clone(), stroked)));
+            let (folder, how) = (opened.folder.clone(), as_it_was(opened, desk.settings.solve));
+            desk.ask(Command::Look(Ask::Solve(sources, folder, how)));
         }
         rule(ui);
     }
@@ -247,6 +255,18 @@ impl Look {
             }
         });
     }
+}
+
+/// How a solution was solved, so that its mask is all that changes; `settings`: what it does not say.
+fn as_it_was(opened: &Opened, settings: SolveSettings) -> SolveSettings {
+    let method = match opened.method.as_str() {
+        "auto" => MethodName::Auto,
+        "least-squares" => MethodName::LeastSquares,
+        "robust" => MethodName::Robust,
+        _ => settings.method,
+    };
+    // Maps that were undistorted have no frames on their grid, and so no mask.
+    SolveSettings { method, undistort: false, ..settings }
 }
 
 fn section(ui: &mut Ui, title: &str, contents: impl FnOnce(&mut Ui)) {

@@ -2,17 +2,19 @@
 
 use super::opened::{self, OpenError};
 use super::view::{Pyramid, picture};
-use super::{Ask, Sources, Told, slopes};
+use super::{Ask, Sources, Stroked, Told, drafts, slopes};
+use crate::rooms::Room;
 use crate::settings::SolveSettings;
 use crate::texts::look as texts;
+use crate::worker::what::{What, is_open, newest_solution};
 use crate::worker::{Outbox, Tools, Update};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use weavelight::files::FileError;
-use weavelight::raster::write_png_grey8;
+use weavelight::files::{FileError, write_atomic};
+use weavelight::raster::encode_png_grey8;
 use weavelight::report::page_of_solve;
 use weavelight::session::Session;
-use weavelight::solve::{Rows, Scene, Shown, SolveError, load_scene, run_with_page};
+use weavelight::solve::{MASK_FILE, Rows, Scene, Shown, SolveError, load_scene, run_with_page};
 use weavelight_calibration::description::Image;
 
 /// The frames that were looked at last, decoded.
@@ -25,16 +27,51 @@ pub struct Frames {
 pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
     match ask {
         Ask::Open(folder) => open(&folder, tools, out),
-        Ask::Compare(folder, with) => compare(&folder, &with, out),
+        Ask::Compare(folder, with) => compare(&folder, &with, tools, out),
         Ask::Picture(sources, light) => look_at(&sources, light, Kind::Picture, tools, out),
         Ask::Residual(sources, light) => look_at(&sources, light, Kind::Residual, tools, out),
         Ask::Photosite(sources, at) => photosite(&sources, at, tools, out),
-        Ask::Mask(session, mask) => save_mask(&session, &mask, tools, out),
+        Ask::Mask(sources, stroked) => save_mask(&sources.session, stroked, tools, out),
+        Ask::Draft(file) => {
+            let draft = drafts::read(&file).map(Box::new);
+            out.tell(Update::Look(Told::Draft(file, draft)));
+        }
+        Ask::SolveScan(scan, settings) => solve_scan(&scan, settings, tools, out),
         Ask::Solve(sources, solution, settings) => solve(&sources, &solution, settings, tools, out),
     }
 }
 
-fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
+/// Whatever is opened: a solution is shown, a capture session's newest solution too, a rig's scans are listed.
+fn open(path: &Path, tools: &mut Tools, out: &Outbox) {
+    match What::is(path) {
+        What::Solution(folder) => open_solution(&folder, tools, out),
+        What::Scan(scan) => match newest_solution(&scan, tools.place.as_ref()) {
+            Some(solution) => open_solution(&solution, tools, out),
+            None => out.tell(Update::Look(Told::Unsolved(scan))),
+        },
+        What::Rig(folder) => {
+            out.tell(Update::GoTo(Room::Scans));
+            if !is_open(&folder, tools.place.as_ref()) {
+                crate::worker::open::open(&folder, tools, out);
+            }
+        }
+        What::Target(folder) => out.fail(texts::OPENING_FOLDER, &texts::is_target(&folder)),
+        What::Calibration(folder, _) => {
+            out.fail(texts::OPENING_FOLDER, &texts::is_calibration(&folder));
+        }
+        // It may be a solution without its report.
+        What::Other(path) => open_solution(&path, tools, out),
+    }
+}
+
+fn solve_scan(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) {
+    let how = (settings, weavelight::solve::Reuse::IfCurrent);
+    if let Some(solved) = crate::rooms::scan::solve(scan, how, tools, out) {
+        open_solution(&solved.solution, tools, out);
+    }
+}
+
+fn open_solution(folder: &Path, tools: &mut Tools, out: &Outbox) {
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let opened = out.job(&texts::opening(&name), || {
         opened::open(folder, tools.place.as_ref(), &|share, step| out.tick(share, step))
@@ -44,7 +81,16 @@ fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
     }
 }
 
-fn compare(folder: &Path, with: &Arc<Pyramid>, out: &Outbox) {
+fn compare(path: &Path, with: &Arc<Pyramid>, tools: &Tools, out: &Outbox) {
+    let folder = match What::is(path) {
+        What::Solution(folder) => folder,
+        What::Scan(scan) => match newest_solution(&scan, tools.place.as_ref()) {
+            Some(solution) => solution,
+            None => return out.fail(texts::OPENING_FOLDER, &texts::not_solved(&scan)),
+        },
+        _ => path.to_owned(),
+    };
+    let folder = folder.as_path();
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let read = out.job(&texts::opening(&name), || {
         let surface = opened::read_surface(folder)?;
@@ -137,28 +183,38 @@ fn scene<'t>(
     Ok(frames.scene.insert(scene))
 }
 
-/// Writes `mask.png` and notes it in the manifest; the picture first, so that the manifest never names what is not there.
-fn save_mask(session: &Path, mask: &Image<bool>, tools: &mut Tools, out: &Outbox) {
-    const FILE: &str = "mask.png";
+/// Writes the mask and notes it in the manifest; the picture first, so that the manifest never names what is not there. A
+/// picture that the manifest does not name is another one, and stays.
+fn save_mask(session: &Path, stroked: Stroked, tools: &mut Tools, out: &Outbox) {
     let saved = || -> Result<(), Box<dyn std::error::Error>> {
         let mut manifest = Session::load(session)?;
-        let white = mask.data.iter().map(|inside| if *inside { 255 } else { 0 }).collect();
-        let picture = Image { width: mask.width, height: mask.height, data: white };
-        let fresh = session.join(".mask-new.png");
-        write_png_grey8(&fresh, &picture)?;
-        let whole = session.join(FILE);
-        std::fs::rename(&fresh, &whole).map_err(|error| FileError::write(&whole, error))?;
-        manifest.mask = Some(FILE.into());
-        manifest.save()?;
+        let file = mask_file(&manifest);
+        let path = session.join(&file);
+        let bytes = encode_png_grey8(&drafts::in_grey(&stroked.mask))
+            .map_err(|error| FileError::write(&path, error))?;
+        write_atomic(&path, &bytes)?;
+        if manifest.mask.as_ref() != Some(&file) {
+            manifest.mask = Some(file);
+            manifest.save()?;
+        }
         Ok(())
     };
     match saved() {
         Ok(()) => {
             tools.frames = Frames::default();
-            out.tell(Update::Look(Told::MaskSaved));
+            out.tell(Update::Look(Told::MaskSaved(stroked.key, stroked.version)));
         }
         Err(error) => out.fail(texts::SAVING_MASK, &error),
     }
+}
+
+/// `mask.png`, or the next number where a picture of that name is not this capture session's mask.
+fn mask_file(session: &Session) -> PathBuf {
+    let numbered = (2..).map(|k| PathBuf::from(format!("mask-{k}.png")));
+    let is_ours = |file: &PathBuf| {
+        session.mask.as_ref() == Some(file) || session.folder.join(file).symlink_metadata().is_err()
+    };
+    std::iter::once(PathBuf::from(MASK_FILE)).chain(numbered).find(is_ours).unwrap_or_default()
 }
 
 /// The same call with the same settings as the command line's, and then its solution is looked at.
@@ -176,6 +232,6 @@ fn solve(
         run_with_page(&options, &|state| out.tick(state.share(), state.stage.what()), Some(&page))
     });
     if solved.is_ok() {
-        open(solution, tools, out);
+        open_solution(solution, tools, out);
     }
 }

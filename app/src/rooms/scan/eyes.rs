@@ -26,6 +26,8 @@ pub(super) struct Sight {
     pub(super) drift_check: bool,
     pub(super) file: PathBuf,
     pub(super) settings: Settings,
+    /// What the manifest says of it.
+    pub(super) hint: Hint,
 }
 
 /// Looks at frames as they come.
@@ -63,7 +65,7 @@ fn watch(inbox: &Receiver<Sight>, place: &Place, folder: &Path, out: &Outbox) {
     let calibration = Calibration::load(&place.calibration()).ok();
     let mut sums: Option<Sums> = None;
     for sight in inbox {
-        let Some(frame) = read(&sight.file) else { continue };
+        let Some(frame) = read(&sight) else { continue };
         let picture = thumb(&frame, sight.light, calibration.as_ref());
         let (light, drift_check) = (sight.light, sight.drift_check);
         out.tell(Update::Scan(Told::Frame(Box::new(Thumb { light, drift_check, picture }))));
@@ -78,8 +80,8 @@ fn watch(inbox: &Receiver<Sight>, place: &Place, folder: &Path, out: &Outbox) {
     }
 }
 
-fn read(file: &Path) -> Option<Frame> {
-    decode(&read_input(file, InputKind::Picture).ok()?, &Hint::default()).ok()
+fn read(sight: &Sight) -> Option<Frame> {
+    decode(&read_input(&sight.file, InputKind::Picture).ok()?, &sight.hint).ok()
 }
 
 /// The maps so far, and where their pixels are.

@@ -1,7 +1,8 @@
 //! What is to be scanned: name, thickness, exposure.
 
-use super::{Ask, Order};
+use super::{Ask, Order, What};
 use crate::desk::Desk;
+use crate::names::Taken;
 use crate::number::{Number, Unit};
 use crate::place::Place;
 use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
@@ -42,9 +43,9 @@ impl Default for FormSettings {
 }
 
 impl FormSettings {
-    /// Counts the name on until no scan of `place` has it.
-    pub(super) fn next_free_name(&mut self, place: Option<&Place>) {
-        while is_taken(&self.name, place) {
+    /// Counts the name on until no scan has it.
+    pub(super) fn next_free_name(&mut self, taken: &Taken) {
+        while taken.has(self.name.trim()) {
             self.name = next_name(&self.name);
         }
     }
@@ -132,7 +133,7 @@ impl Form {
         if self.fabric != before {
             desk.ask(Command::Scan(Ask::LayOut(self.fabric)));
             desk.settings.scan.name = self.fabric.name().to_owned();
-            desk.settings.scan.next_free_name(desk.place.as_ref());
+            desk.settings.scan.next_free_name(&desk.taken);
         }
     }
 
@@ -167,7 +168,7 @@ impl Form {
             false => widgets::large(ui, text, size, self.can_go(desk, done)),
         };
         let clicked = button.clicked();
-        let taken = !done && is_taken(&desk.settings.scan.name, desk.place.as_ref());
+        let taken = !done && desk.taken.has(desk.settings.scan.name.trim());
         let hint = match (desk.is_busy(), taken, self.unread && !done) {
             (true, ..) => texts::BUSY,
             (_, true, _) => texts::TAKEN,
@@ -180,28 +181,23 @@ impl Form {
 
     /// Whether the big button can be pressed.
     pub(super) fn can_go(&self, desk: &Desk, done: bool) -> bool {
-        let name = &desk.settings.scan.name;
-        let free = !name.trim().is_empty() && !is_taken(name, desk.place.as_ref());
+        let name = desk.settings.scan.name.trim();
+        let free = !name.is_empty() && !desk.taken.has(name);
         !desk.is_busy() && (done || (free && !self.unread))
     }
 }
 
 /// What to scan as the desk says.
-pub(super) fn order(desk: &Desk, resume: bool) -> Order {
+pub(super) fn order(desk: &Desk) -> Order {
     let form = &desk.settings.scan;
     Order {
         name: form.name.trim().to_owned(),
         thickness_mm: (form.thickness_mm > 0.0).then_some(form.thickness_mm),
-        exposure_s: (!form.find_exposure && !resume).then_some(form.exposure_s),
+        exposure_s: (!form.find_exposure).then_some(form.exposure_s),
         iso: form.iso,
-        resume,
+        what: What::New,
         solve: desk.settings.solve,
     }
-}
-
-/// Whether a scan has this name already.
-pub(super) fn is_taken(name: &str, place: Option<&Place>) -> bool {
-    place.is_some_and(|place| place.scan(name).exists())
 }
 
 fn solving(ui: &mut egui::Ui, settings: &mut SolveSettings) {

@@ -1,19 +1,25 @@
 //! The Scan room, the daily loop: name, one big button, a strip that fills light by light, maps while later lights still fire,
 //! and a solution at the end.
 
+mod again;
 mod buttons;
 mod eyes;
 mod form;
 mod histogram;
 pub mod picture;
+mod result;
 mod strip;
 mod view;
 mod work;
 
+pub use again::Swapped;
 pub use picture::Thumb;
+pub use work::SolvedScan;
 
 use crate::desk::Desk;
-use crate::place::Place;
+use crate::names::Taken;
+use crate::place::{Place, same};
+use crate::rooms::scans::{Deleted, Unfinished};
 use crate::rooms::{Room, look};
 use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
@@ -28,6 +34,7 @@ use view::View;
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{Preview, Summary};
 use weavelight::solution::Report;
+use weavelight::solve::Reuse;
 use weavelight_sim::cloth::Preset;
 
 /// What this room asks of the worker.
@@ -53,8 +60,8 @@ pub enum Ask {
     LayOut(Preset),
     /// Whether there is a scan that was stopped.
     LookForUnfinished,
-    /// A scan into the system's bin.
-    ThrowAway(PathBuf),
+    /// What was scanned again back out of the bin, and what took its place there.
+    Undo(Deleted),
 }
 
 /// What to scan and how.
@@ -68,10 +75,21 @@ pub struct Order {
     pub exposure_s: Option<f64>,
     /// Sensitivity.
     pub iso: f64,
-    /// Go on with what is there.
-    pub resume: bool,
+    /// Whether something is there.
+    pub what: What,
     /// How to solve it.
     pub solve: SolveSettings,
+}
+
+/// What is scanned: the form says how, but not whether it is there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum What {
+    /// Another swatch.
+    New,
+    /// What is in this folder, from where it stood.
+    Resume(PathBuf),
+    /// What is in this folder once more; that goes to the bin.
+    Again(PathBuf),
 }
 
 /// What the worker tells this room.
@@ -79,6 +97,14 @@ pub struct Order {
 pub enum Told {
     /// A test shot.
     TestShot(Box<Preview>),
+    /// The names that the scans of the rig in a folder have.
+    Taken(PathBuf, Taken),
+    /// The scan's folder.
+    Begun(PathBuf),
+    /// What is scanned again is in the bin.
+    Replaced(Option<Deleted>),
+    /// Another scan is in the place of the one that was shown.
+    Swapped(Swapped),
     /// The frame that is being taken, as in "light 4".
     Taking(String),
     /// It rests.
@@ -91,6 +117,8 @@ pub enum Told {
     Complete(Box<Summary>),
     /// The solution stands.
     Solved {
+        /// The capture session's folder.
+        scan: PathBuf,
         /// Its folder.
         solution: PathBuf,
         /// What it says of itself.
@@ -100,8 +128,10 @@ pub enum Told {
     },
     /// The folder of a scan to solve.
     Dropped(PathBuf),
-    /// Name and frames of a scan that was stopped, if there is one.
-    Unfinished(Option<(String, usize)>),
+    /// The scan under way was stopped or failed; these lights have a frame (`None`: no light).
+    Ended(Vec<Option<usize>>),
+    /// A scan that was stopped, if there is one.
+    Unfinished(Option<Unfinished>),
 }
 
 /// Where a scan stands.
@@ -115,7 +145,7 @@ pub(crate) enum Stage {
     /// It rests.
     Paused,
     /// Frames are there, maps not yet, or not to be had.
-    Scanned(Box<Summary>),
+    Scanned(Option<Box<Summary>>),
     /// Maps are there.
     Solved { solution: PathBuf, report: Box<Report>, expected_deg: Option<f64> },
 }
@@ -128,9 +158,26 @@ pub struct Scan {
     stage: Stage,
     strip: Strip,
     view: View,
-    unfinished: Option<(String, usize)>,
+    /// The scan that stage, strip and view are about, whatever the form says.
+    about: Option<About>,
+    unfinished: Option<Unfinished>,
     /// Whether that was not drawn yet.
     offer_is_new: bool,
+    /// What was scanned again, as it was before.
+    replaced: Option<Deleted>,
+    /// The name is to be counted on, once it is known which are taken.
+    count_on: bool,
+}
+
+/// A scan.
+#[derive(Clone, Debug, PartialEq)]
+struct About {
+    /// The swatch's name.
+    name: String,
+    /// Its folder; `None` until it is begun.
+    folder: Option<PathBuf>,
+    /// How it was taken; `None` where that was not here and now.
+    order: Option<Order>,
 }
 
 impl Scan {
@@ -183,6 +230,7 @@ impl Scan {
             egui::ScrollArea::vertical().show(ui, |ui| {
                 ui.heading(crate::texts::rooms::SCAN);
                 self.offer_unfinished(ui, desk);
+                self.offer_undo(ui, desk);
                 tell_expired(ui, desk);
                 ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
                 widgets::reveal_focus(ui);
@@ -197,16 +245,23 @@ impl Scan {
     /// Whether the swatch on the table is scanned: what comes next is another one.
     fn is_done(&self, desk: &Desk) -> bool {
         let done = matches!(self.stage, Stage::Scanned(_) | Stage::Solved { .. });
-        done && form::is_taken(&desk.settings.scan.name, desk.place.as_ref())
+        let name = desk.settings.scan.name.trim();
+        done && self.about.as_ref().is_some_and(|about| about.name == name)
     }
 
     /// What the big button does.
     fn go(&mut self, desk: &mut Desk) {
         if !self.is_done(desk) {
-            return self.begin(order(desk, false), desk);
+            return self.begin(order(desk), desk);
         }
-        desk.settings.scan.next_free_name(desk.place.as_ref());
+        desk.settings.scan.next_free_name(&desk.taken);
+        self.clear();
         self.stage = Stage::Ready;
+        (self.about, self.replaced) = (None, None);
+    }
+
+    /// Nothing of the last scan is to be seen.
+    fn clear(&mut self) {
         self.strip = Strip::default();
         self.view.begin();
     }
@@ -233,13 +288,11 @@ impl Scan {
 
     /// A scan that was stopped by whatever, first thing to be seen.
     fn offer_unfinished(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some((name, frames)) = self.unfinished.clone().filter(|_| !desk.is_busy()) else {
-            return;
-        };
+        let Some(found) = self.unfinished.clone().filter(|_| !desk.is_busy()) else { return };
         let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
         frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
-            ui.label(egui::RichText::new(texts::unfinished(&name, frames)).strong());
+            ui.label(egui::RichText::new(texts::unfinished(&found.name, found.frames)).strong());
             ui.horizontal(|ui| {
                 let resume = ui.button(texts::RESUME);
                 if std::mem::take(&mut self.offer_is_new) {
@@ -247,8 +300,10 @@ impl Scan {
                     resume.request_focus();
                 }
                 if resume.clicked() {
-                    desk.settings.scan.name = name.clone();
-                    self.begin(order(desk, true), desk);
+                    desk.settings.scan.name = found.name.clone();
+                    let how = Order { exposure_s: None, thickness_mm: None, ..order(desk) };
+                    let (name, what) = (found.name, What::Resume(found.folder));
+                    self.begin(Order { name, what, ..how }, desk);
                 }
                 if ui.button(texts::LEAVE).clicked() {
                     self.unfinished = None;
@@ -260,43 +315,14 @@ impl Scan {
 
     fn begin(&mut self, order: Order, desk: &mut Desk) {
         self.stage = Stage::Scanning;
-        self.unfinished = None;
-        if !order.resume {
-            self.strip = Strip::default();
-        }
-        self.view.begin();
-        desk.ask(Command::Scan(Ask::Scan(order)));
-    }
-
-    /// What came of the scan, and what to do with it.
-    fn result(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let (good, text) = match &self.stage {
-            Stage::Scanned(summary) => (summary.warnings.is_empty(), texts::scanned(summary)),
-            Stage::Solved { report, expected_deg, .. } => {
-                (is_good(report), texts::solved(report, *expected_deg))
-            }
-            _ => return,
+        (self.unfinished, self.replaced) = (None, None);
+        self.clear();
+        let folder = match &order.what {
+            What::New => None,
+            What::Resume(folder) | What::Again(folder) => Some(folder.clone()),
         };
-        let sign = if good { widgets::Sign::Good } else { widgets::Sign::Warning };
-        let name = desk.settings.scan.name.clone();
-        ui.horizontal_wrapped(|ui| {
-            sign.ui(ui);
-            ui.label(egui::RichText::new(text).strong());
-            if let Stage::Solved { solution, .. } = &self.stage
-                && ui.button(texts::LOOK_CLOSER).on_hover_text(texts::ENTER).clicked()
-            {
-                look_closer(solution, desk);
-            }
-            if !desk.is_busy()
-                && ui.button(texts::REPEAT).on_hover_text(texts::REPEAT_HINT).clicked()
-            {
-                if let Some(place) = &desk.place {
-                    let scan = place.scan(&name);
-                    desk.ask(Command::Scan(Ask::ThrowAway(scan)));
-                }
-                self.begin(order(desk, false), desk);
-            }
-        });
+        self.about = Some(About { name: order.name.clone(), folder, order: Some(order.clone()) });
+        desk.ask(Command::Scan(Ask::Scan(order)));
     }
 
     /// Space does what the big button does, Enter looks closer, wherever no text is being written.
@@ -307,7 +333,7 @@ impl Scan {
         if let Stage::Solved { solution, .. } = &self.stage
             && pressed(egui::Key::Enter)
         {
-            look_closer(solution, desk);
+            desk.look_at(solution.clone());
         }
         let can_go = !self.is_running() && self.form.can_go(desk, self.is_done(desk));
         if space && can_go && !self.buttons.are_new(ui, false) {
@@ -331,49 +357,71 @@ impl Scan {
             Told::Paused => self.stage = Stage::Paused,
             Told::Frame(thumb) => self.strip.add(*thumb),
             Told::Maps(maps) => self.view.show_maps(maps),
+            Told::Taken(of, taken) => self.hear_taken(&of, taken, desk),
+            Told::Begun(folder) => {
+                if let Some(about) = &mut self.about {
+                    about.folder = Some(folder);
+                }
+            }
+            Told::Replaced(replaced) => self.replaced = replaced,
+            Told::Swapped(swapped) => self.swap(swapped),
             Told::Complete(summary) => {
                 if let Some(used) = summary.settings {
                     desk.settings.scan.exposure_s = used.exposure_s;
                 }
                 self.strip.done();
-                self.stage = Stage::Scanned(summary);
+                self.stage = Stage::Scanned(Some(summary));
             }
-            Told::Solved { solution, report, expected_deg } => {
+            Told::Solved { scan, solution, report, expected_deg } => {
+                self.turn_to(&scan);
                 self.stage = Stage::Solved { solution, report, expected_deg };
             }
             Told::Dropped(scan) => {
                 let settings = desk.settings.solve;
                 desk.ask(Command::Scan(Ask::Solve { scan, settings }));
             }
-            Told::Unfinished(found) => {
-                if matches!(self.stage, Stage::Scanning | Stage::Paused) {
+            Told::Ended(lights) => {
+                if self.is_running() {
                     self.stage = Stage::Ready;
-                    self.strip.done();
                 }
+                self.strip.done();
+                self.strip.keep(&lights);
+            }
+            Told::Unfinished(found) => {
                 self.offer_is_new = found.is_some();
                 self.unfinished = found;
             }
         }
     }
 
+    fn hear_taken(&mut self, of: &Path, taken: Taken, desk: &mut Desk) {
+        if desk.place.as_ref().is_none_or(|place| place.folder != of) {
+            return;
+        }
+        desk.taken = taken;
+        if std::mem::take(&mut self.count_on) {
+            desk.settings.scan.next_free_name(&desk.taken);
+        }
+    }
+
+    /// A scan that was solved is the one that is shown; nothing of another one stays beside it.
+    fn turn_to(&mut self, scan: &Path) {
+        let of = |about: &About| about.folder.as_ref().is_some_and(|folder| same(folder, scan));
+        if self.about.as_ref().is_some_and(of) {
+            return;
+        }
+        let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.about = Some(About { name, folder: Some(scan.to_owned()), order: None });
+        self.replaced = None;
+        self.clear();
+    }
+
     /// Another rig: nothing of the last one stays.
     pub fn reset(&mut self, desk: &mut Desk) {
-        *self = Self::default();
-        desk.settings.scan.next_free_name(desk.place.as_ref());
+        *self = Self { count_on: true, ..Self::default() };
+        desk.taken = Taken::default();
         desk.ask(Command::Scan(Ask::LookForUnfinished));
     }
-}
-
-fn look_closer(solution: &Path, desk: &mut Desk) {
-    desk.ask(Command::Look(look::Ask::Open(solution.to_owned())));
-    desk.go_to(Room::Look);
-}
-
-/// Whether a solution can be kept without looking twice: nothing was warned of, and hardly anything clips.
-fn is_good(report: &Report) -> bool {
-    const CLIPPED: f64 = 0.01;
-    let clipped = report.saturated_pixels as f64;
-    report.warnings.is_empty() && clipped <= CLIPPED * report.pixels as f64
 }
 
 /// An old calibration makes maps that nobody should trust blindly.
@@ -389,6 +437,16 @@ fn tell_expired(ui: &mut egui::Ui, desk: &mut Desk) {
         });
     });
     ui.add_space(theme::GAP);
+}
+
+/// The solution of a scan, the way every room makes it: `None` where it failed, and the user knows.
+pub fn solve(
+    scan: &Path,
+    how: (SolveSettings, Reuse),
+    tools: &mut Tools,
+    out: &Outbox,
+) -> Option<SolvedScan> {
+    work::solve(scan, how, tools, out)
 }
 
 /// The worker's part.

@@ -38,6 +38,12 @@ impl Strip {
         self.taking = None;
     }
 
+    /// Only the frames of these lights are there.
+    pub(super) fn keep(&mut self, lights: &[Option<usize>]) {
+        self.waiting.retain(|thumb| lights.contains(&thumb.light));
+        self.frames.retain(|(light, _)| lights.contains(light));
+    }
+
     pub(super) fn ui(&mut self, ui: &mut egui::Ui, lights: usize) {
         for thumb in self.waiting.drain(..) {
             let name = format!("frame {:?}", thumb.light);

@@ -1,7 +1,9 @@
 //! What lies in the folder of scans.
 
 use crate::place::Place;
+use crate::worker::bin::Binned;
 use std::path::{Path, PathBuf};
+use weavelight::device::scan::Plan;
 use weavelight::instrument::Rig;
 use weavelight::session::{Kind, Session};
 
@@ -27,6 +29,28 @@ impl Entry {
     }
 }
 
+/// A scan that is in the bin, with its solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deleted {
+    /// The swatch's name.
+    pub name: String,
+    /// The scan's folder, as it was.
+    pub folder: PathBuf,
+    /// Both, where they are now.
+    pub binned: Binned,
+}
+
+/// A scan that was stopped before its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unfinished {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// The swatch's name.
+    pub name: String,
+    /// How many frames are there.
+    pub frames: usize,
+}
+
 /// The scans of a rig, newest first.
 pub(super) fn list(place: &Place) -> Vec<Entry> {
     let folders = std::fs::read_dir(place.scans()).into_iter().flatten().flatten();
@@ -40,7 +64,7 @@ fn entry(folder: &Path, place: &Place) -> Option<Entry> {
     let session = Session::load(folder).ok().filter(|session| session.kind == Kind::Swatch)?;
     let solution = place.solution(folder);
     Some(Entry {
-        frames: [session.frames.len(), frames_of_a_scan(&session, &place.rig)],
+        frames: frames(&session, &place.rig),
         name: session.name,
         captured: session.captured,
         solution: solution.join(weavelight::solution::REPORT_JSON).exists().then_some(solution),
@@ -48,16 +72,61 @@ fn entry(folder: &Path, place: &Place) -> Option<Entry> {
     })
 }
 
-/// Every light, one frame without light, and the first light again; further exposures come on top.
-fn frames_of_a_scan(session: &Session, rig: &Rig) -> usize {
-    let further =
-        session.frames.iter().filter(|frame| frame.file.to_string_lossy().contains("-exposure-"));
-    rig.lights.len() + 2 + further.count()
+/// Frames whose files are there, and those that there ought to be: what is recorded, and what the scan's plan has beyond that.
+fn frames(session: &Session, rig: &Rig) -> [usize; 2] {
+    let is_there =
+        |file: PathBuf| file.metadata().is_ok_and(|file| file.is_file() && file.len() > 0);
+    let there = session.frames.iter().filter(|frame| is_there(session.frame_path(frame))).count();
+    let missing = Plan::missing(rig, &session.frames).ok().flatten().map_or(0, |steps| steps.len());
+    [there, session.frames.len() + missing]
 }
 
-/// Name and frames of a scan that was stopped before its end.
-pub fn incomplete(folder: &Path, rig: &Rig) -> Option<(String, usize)> {
+/// A scan that was stopped before its end, or has lost frames since; `None` where nothing is missing.
+pub fn incomplete(folder: &Path, rig: &Rig) -> Option<Unfinished> {
     let session = Session::load(folder).ok().filter(|session| session.kind == Kind::Swatch)?;
-    let frames = session.frames.len();
-    (frames < frames_of_a_scan(&session, rig)).then_some((session.name, frames))
+    let [there, wanted] = frames(&session, rig);
+    (there < wanted).then(|| Unfinished {
+        folder: folder.to_owned(),
+        name: session.name,
+        frames: there,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use weavelight::session::FrameEntry;
+    use weavelight::simulate;
+
+    #[test]
+    fn frames_are_counted_by_the_plan_and_by_what_is_on_the_disk() {
+        let home = tempfile::tempdir().unwrap();
+        let options = simulate::Options {
+            out: home.path().join("rig"),
+            size_px: Some([32, 32]),
+            ..simulate::Options::default()
+        };
+        simulate::write_rig(&options).unwrap();
+        let rig = Place::open(&options.out).unwrap().rig;
+        let folder = home.path().join("scan");
+        std::fs::create_dir(&folder).unwrap();
+        let check = |stems: &[&str], lost: usize, expected: [usize; 2]| {
+            let mut session = Session::new(&folder, Kind::Swatch, "x");
+            for (k, stem) in stems.iter().enumerate() {
+                let light = stem.strip_prefix("light-").map(|light| light[..2].parse().unwrap());
+                let entry = FrameEntry::new(format!("{stem}.dng"), light, 0.1, 100.0);
+                let path = session.frame_path(&entry);
+                std::fs::write(&path, if k < lost { "" } else { "frame" }).unwrap();
+                session.frames.push(entry);
+            }
+            assert_eq!(frames(&session, &rig), expected, "{stems:?}");
+        };
+        check(&[], 0, [0, 12]);
+        check(&["ambient", "light-00", "light-01"], 0, [3, 12]);
+        check(&["ambient", "light-00", "light-01"], 2, [1, 12]);
+        // One further exposure each of ten lights.
+        check(&["ambient", "light-00", "light-00-exposure-1"], 0, [3, 22]);
+        // Imported under names of their own: nothing says that more is to come.
+        check(&["DSC_0001", "long-exposure-2"], 0, [2, 2]);
+    }
 }

@@ -3,12 +3,14 @@
 mod list;
 mod work;
 
-pub use list::{Entry, incomplete};
+pub use list::{Deleted, Entry, Unfinished, incomplete};
 
 use crate::browse::Browse;
 use crate::desk::Desk;
+use crate::names::folder_name;
 use crate::place::Place;
-use crate::rooms::{Room, look, scan};
+use crate::rooms::Room;
+use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
 use crate::{texts::scans as texts, theme, widgets};
 use eframe::egui::{
@@ -16,6 +18,7 @@ use eframe::egui::{
 };
 use std::collections::HashMap;
 use std::path::PathBuf;
+use weavelight::solve::Reuse;
 
 /// What this room asks of the worker.
 #[derive(Debug)]
@@ -24,15 +27,24 @@ pub enum Ask {
     List(Box<Place>),
     /// The picture of a scan of a rig.
     Thumbnail(Box<Place>, PathBuf),
+    /// The solution of a scan.
+    Solve {
+        /// The capture session's folder.
+        scan: PathBuf,
+        /// How.
+        settings: SolveSettings,
+        /// Whether one that is up to date stays.
+        reuse: Reuse,
+    },
     /// A scan and its solution into the system's bin.
     Delete(Entry),
     /// Out of the bin again.
-    BringBack(Entry),
+    BringBack(Deleted),
     /// A copy of a solution.
     Export {
         /// The solution.
         solution: PathBuf,
-        /// The folder to make.
+        /// The folder to make; numbered on where it is there.
         to: PathBuf,
     },
 }
@@ -44,12 +56,19 @@ pub enum Told {
     List(PathBuf, Vec<Entry>),
     /// The picture of a scan.
     Thumbnail(PathBuf, ColorImage),
+    /// The solution of a scan stands; true where it did already.
+    Solved(PathBuf, bool),
     /// A scan and its solution are in the bin.
-    Deleted(Entry),
+    Deleted(Deleted),
     /// And out of it again.
-    BroughtBack(Entry),
-    /// A solution was copied here.
-    Exported(PathBuf),
+    BroughtBack(Deleted),
+    /// A solution was copied.
+    Exported {
+        /// The solution.
+        solution: PathBuf,
+        /// Where the copy is.
+        to: PathBuf,
+    },
 }
 
 /// Width of a card, points.
@@ -64,12 +83,17 @@ pub struct Scans {
     entries: Option<Vec<Entry>>,
     search: String,
     chosen: Option<PathBuf>,
+    /// It may be out of sight.
+    show_chosen: bool,
+    /// A scan whose solution was up to date when it was to be solved again.
+    up_to_date: Option<PathBuf>,
     pictures: HashMap<PathBuf, Picture>,
     export_to: String,
     browse: Browse,
-    said: Option<String>,
-    /// What was deleted here and can be brought back, the last one last.
-    deleted: Vec<Entry>,
+    /// Of which solution something was said, and what.
+    said: Option<(PathBuf, String)>,
+    /// What was deleted and can be brought back, the last one last.
+    deleted: Vec<Deleted>,
     /// Whether the list is as the folder was when the room was entered.
     fresh: bool,
 }
@@ -94,24 +118,24 @@ impl Scans {
             self.fresh = true;
             desk.ask(Command::Scans(Ask::List(Box::new(place))));
         }
-        let chosen = self.chosen.as_ref().and_then(|path| self.entry(path)).cloned();
-        if let Some(entry) = chosen {
+        if let Some(entry) = self.chosen() {
             let pane = egui::Panel::right("scan details").exact_size(280.0).resizable(false);
             pane.show(ui, |ui| self.details(ui, &entry, desk));
         }
         egui::CentralPanel::default().show(ui, |ui| self.gallery(ui, desk));
     }
 
-    fn entry(&self, path: &PathBuf) -> Option<&Entry> {
-        self.entries.iter().flatten().find(|entry| entry.folder == *path)
+    /// What was chosen, as long as the search does not hide it.
+    fn chosen(&self) -> Option<Entry> {
+        let chosen = self.chosen.as_ref()?;
+        self.found().into_iter().find(|entry| entry.folder == *chosen)
     }
 
     fn gallery(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         ui.horizontal(|ui| {
             ui.heading(crate::texts::rooms::SCANS);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let hint = egui::TextEdit::singleline(&mut self.search).hint_text(texts::SEARCH);
-                ui.add(hint.desired_width(220.0)).on_hover_text(texts::SEARCH);
+                self.search_field(ui);
             });
         });
         self.offer_undo(ui, desk);
@@ -136,6 +160,27 @@ impl Scans {
                 found.iter().for_each(|entry| self.card(ui, entry, desk));
             });
         });
+    }
+
+    /// Escape empties it, Enter chooses the first scan that is found.
+    fn search_field(&mut self, ui: &mut egui::Ui) {
+        let id = ui.make_persistent_id("search");
+        // The field itself gives the keyboard back with these keys.
+        let pressed = |key| ui.input(|input| input.key_pressed(key));
+        let written = ui.memory(|memory| memory.has_focus(id) || memory.had_focus_last_frame(id));
+        let (clear, choose) = (written && pressed(Key::Escape), written && pressed(Key::Enter));
+        if clear {
+            self.search.clear();
+        }
+        let field = egui::TextEdit::singleline(&mut self.search).hint_text(texts::SEARCH).id(id);
+        ui.add(field.desired_width(220.0)).on_hover_text(texts::SEARCH);
+        if choose {
+            // It is not to open the scan, too.
+            ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter));
+            if let Some(entry) = self.found().first() {
+                self.choose(entry);
+            }
+        }
     }
 
     /// What was deleted last can be had again: with the button, or Control and Z.
@@ -169,8 +214,10 @@ impl Scans {
         let at = found.iter().position(|entry| self.chosen.as_ref() == Some(&entry.folder));
         if pressed(Key::ArrowRight) || pressed(Key::ArrowDown) {
             self.choose(&found[at.map_or(0, |k| (k + 1).min(found.len() - 1))]);
+            self.show_chosen = true;
         } else if pressed(Key::ArrowLeft) || pressed(Key::ArrowUp) {
             self.choose(&found[at.map_or(0, |k| k.saturating_sub(1))]);
+            self.show_chosen = true;
         }
         let Some(entry) = at.map(|k| found[k].clone()) else { return };
         let export = ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::E));
@@ -189,6 +236,7 @@ impl Scans {
         self.chosen = Some(entry.folder.clone());
         self.export_to.clear();
         self.said = None;
+        self.up_to_date = None;
     }
 
     fn card(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
@@ -196,10 +244,13 @@ impl Scans {
         let label = format!("{}, {}", entry.name, texts::state(entry));
         let info = || egui::WidgetInfo::labeled(egui::Role::Button, true, label.clone());
         response.widget_info(info);
+        let chosen = self.chosen.as_ref() == Some(&entry.folder);
+        if chosen && std::mem::take(&mut self.show_chosen) {
+            response.scroll_to_me(None);
+        }
         if !ui.is_rect_visible(rect) {
             return;
         }
-        let chosen = self.chosen.as_ref() == Some(&entry.folder);
         let visuals = ui.visuals().clone();
         let fill = if chosen { visuals.selection.bg_fill } else { visuals.faint_bg_color };
         let painter = ui.painter_at(rect);
@@ -263,12 +314,8 @@ impl Scans {
             if ui.add_enabled(entry.solution.is_some(), egui::Button::new(texts::OPEN)).clicked() {
                 open(entry, desk);
             }
-            let again = if entry.solution.is_some() { texts::SOLVE_AGAIN } else { texts::SOLVE };
-            if ui.add_enabled(idle && entry.is_complete(), egui::Button::new(again)).clicked() {
-                let (scan, settings) = (entry.folder.clone(), desk.settings.solve);
-                desk.ask(Command::Scan(scan::Ask::Solve { scan, settings }));
-            }
-            let delete = egui::Button::new(texts::DELETE);
+            self.solve(ui, entry, desk);
+            let delete = egui::Button::new(texts::delete(&entry.name)).truncate();
             if ui.add_enabled(idle, delete).on_hover_text(texts::DELETE_HINT).clicked() {
                 desk.ask(Command::Scans(Ask::Delete(entry.clone())));
                 self.chosen = None;
@@ -277,6 +324,26 @@ impl Scans {
         if let Some(solution) = &entry.solution {
             ui.separator();
             self.export(ui, solution.clone(), entry, desk);
+        }
+    }
+
+    fn solve(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+        let again = if entry.solution.is_some() { texts::SOLVE_AGAIN } else { texts::SOLVE };
+        let can = !desk.is_busy() && entry.frames[0] > 0;
+        let mut reuse = None;
+        if ui.add_enabled(can, egui::Button::new(again)).clicked() {
+            reuse = Some(Reuse::IfCurrent);
+        }
+        if self.up_to_date.as_ref() == Some(&entry.folder) {
+            ui.add(egui::Label::new(texts::UP_TO_DATE).wrap());
+            if ui.add_enabled(can, egui::Button::new(texts::SOLVE_ALL_THE_SAME)).clicked() {
+                reuse = Some(Reuse::Never);
+            }
+        }
+        if let Some(reuse) = reuse {
+            let (scan, settings) = (entry.folder.clone(), desk.settings.solve);
+            self.up_to_date = None;
+            desk.ask(Command::Scans(Ask::Solve { scan, settings, reuse }));
         }
     }
 
@@ -289,15 +356,15 @@ impl Scans {
         ui.add(field).labelled_by(label.id);
         ui.horizontal(|ui| {
             if let Some(folder) = self.browse.folder(ui) {
-                self.export_to = folder.join(format!("{} maps", entry.name)).display().to_string();
+                self.export_to = folder.join(export_name(entry)).display().to_string();
             }
             if ui.add_enabled(!desk.is_busy(), egui::Button::new(texts::EXPORT)).clicked() {
-                let to = PathBuf::from(self.export_to.trim());
+                let (solution, to) = (solution.clone(), PathBuf::from(self.export_to.trim()));
                 desk.ask(Command::Scans(Ask::Export { solution, to }));
             }
         });
-        if let Some(said) = &self.said {
-            ui.label(said);
+        if let Some((_, said)) = self.said.as_ref().filter(|(of, _)| *of == solution) {
+            ui.add(egui::Label::new(said).wrap());
         }
     }
 
@@ -313,11 +380,14 @@ impl Scans {
                 self.pictures.insert(folder, Picture::Here(picture));
             }
             Told::Deleted(entry) => self.deleted.push(entry),
-            Told::BroughtBack(entry) => {
-                self.deleted.retain(|other| other.folder != entry.folder);
-                self.choose(&entry);
+            Told::BroughtBack(deleted) => {
+                self.deleted.retain(|other| *other != deleted);
+                self.chosen = Some(deleted.folder);
+                (self.said, self.up_to_date) = (None, None);
+                self.export_to.clear();
             }
-            Told::Exported(to) => self.said = Some(texts::exported(&to)),
+            Told::Solved(scan, up_to_date) => self.up_to_date = up_to_date.then_some(scan),
+            Told::Exported { solution, to } => self.said = Some((solution, texts::exported(&to))),
         }
     }
 
@@ -334,13 +404,16 @@ impl Scans {
 
 /// Where the maps go if nobody says otherwise.
 fn export_folder(entry: &Entry, desk: &Desk) -> PathBuf {
-    desk.settings.home.join("exports").join(format!("{} maps", entry.name))
+    desk.settings.home.join("exports").join(export_name(entry))
+}
+
+fn export_name(entry: &Entry) -> String {
+    format!("{} maps", folder_name(&entry.name))
 }
 
 fn open(entry: &Entry, desk: &mut Desk) {
     if let Some(solution) = &entry.solution {
-        desk.ask(Command::Look(look::Ask::Open(solution.clone())));
-        desk.go_to(Room::Look);
+        desk.look_at(solution.clone());
     }
 }
 

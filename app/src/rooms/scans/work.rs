@@ -1,16 +1,17 @@
 //! The worker's part of the Scans room.
 
 use super::list::list;
-use super::{Ask, Entry, Told};
-use crate::place::Place;
+use super::{Ask, Deleted, Entry, Told};
+use crate::names::free_path;
+use crate::place::{Place, same};
+use crate::rooms::scan;
 use crate::rooms::scan::picture::thumb;
 use crate::texts::scans as texts;
-use crate::worker::{Outbox, Tools, Update};
+use crate::worker::{Outbox, Tools, Update, bin::Binned};
 use eframe::egui::ColorImage;
 use std::path::{Path, PathBuf};
-use weavelight::files::{FileError, StagedFolder, copy_input};
+use weavelight::files::{FileError, OutputKind, StagedFolder, copy_input};
 use weavelight::instrument::Calibration;
-use weavelight::raw::{Hint, decode};
 use weavelight::session::Session;
 use weavelight::solution::OUTPUT;
 
@@ -22,8 +23,13 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
                 out.tell(Update::Scans(Told::Thumbnail(folder, picture)));
             }
         }
+        Ask::Solve { scan, settings, reuse } => {
+            if let Some(outcome) = scan::solve(&scan, (settings, reuse), tools, out) {
+                out.tell(Update::Scans(Told::Solved(scan, outcome.up_to_date)));
+            }
+        }
         Ask::Delete(entry) => delete(entry, out),
-        Ask::BringBack(entry) => bring_back(entry, out),
+        Ask::BringBack(deleted) => bring_back(deleted, out),
         Ask::Export { solution, to } => export(&solution, &to, out),
     }
     // What was deleted or brought back changes the list.
@@ -34,6 +40,7 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
 
 fn tell_list(place: &Place, out: &Outbox) {
     out.tell(Update::Scans(Told::List(place.folder.clone(), list(place))));
+    out.tell(Update::Scan(scan::Told::Taken(place.folder.clone(), place.taken())));
 }
 
 /// The first light's frame made small; kept as a file beside the scans, for the next time.
@@ -46,7 +53,7 @@ fn thumbnail(place: &Place, folder: &Path) -> Option<ColorImage> {
     }
     let session = Session::load(folder).ok()?;
     let entry = session.frames.iter().find(|frame| frame.light.is_some())?;
-    let frame = decode(&session.read_frame(entry).ok()?, &Hint::default()).ok()?;
+    let frame = session.frame(entry).ok()?;
     let calibration = Calibration::load(&place.calibration()).ok();
     let picture = thumb(&frame, entry.light, calibration.as_ref());
     keep(&picture, &kept);
@@ -71,70 +78,77 @@ fn keep(picture: &ColorImage, file: &Path) {
 }
 
 fn delete(entry: Entry, out: &Outbox) {
-    match trash::delete_all(folders(&entry)) {
-        Ok(()) => out.tell(Update::Scans(Told::Deleted(entry))),
-        Err(error) => out.fail(texts::DELETING, &in_words(&entry, &error)),
-    }
-}
-
-/// The scan, and its solution where there is one.
-fn folders(entry: &Entry) -> impl Iterator<Item = &PathBuf> {
-    std::iter::once(&entry.folder).chain(&entry.solution)
-}
-
-fn in_words(entry: &Entry, error: &trash::Error) -> String {
-    format!("{}: {error}; look into the system's bin", entry.folder.display())
-}
-
-fn bring_back(entry: Entry, out: &Outbox) {
-    match restore(&entry) {
-        Ok(()) => out.tell(Update::Scans(Told::BroughtBack(entry))),
-        Err(error) => out.fail(texts::BRINGING_BACK, &in_words(&entry, &error)),
-    }
-}
-
-/// What lay under the entry's names and was deleted last.
-#[cfg(not(target_os = "macos"))]
-fn restore(entry: &Entry) -> Result<(), trash::Error> {
-    let bin = trash::os_limited::list()?;
-    let newest = |folder: &PathBuf| {
-        // The bin knows places without links on the way.
-        let parent = folder.parent()?.canonicalize().ok()?;
-        let place = parent.join(folder.file_name()?);
-        let of_it = bin.iter().filter(|item| item.original_path() == place);
-        of_it.max_by_key(|item| item.time_deleted).cloned()
-    };
-    let items: Vec<trash::TrashItem> = folders(entry).filter_map(newest).collect();
-    match items.is_empty() {
-        true => Err(trash::Error::Unknown { description: "it is not in the bin any more".into() }),
-        false => trash::os_limited::restore_all(items),
-    }
-}
-
-/// There no program may take things out of the bin.
-#[cfg(target_os = "macos")]
-fn restore(_entry: &Entry) -> Result<(), trash::Error> {
-    Err(trash::Error::Unknown { description: "it can be put back in the Finder".into() })
-}
-
-/// Copies a solution; it stands under its name only when whole.
-fn export(solution: &Path, to: &Path, out: &Outbox) {
-    let copied = out.job(texts::EXPORTING, || -> Result<(), FileError> {
-        let staged = StagedFolder::create(to, OUTPUT)?;
-        let files: Vec<PathBuf> = std::fs::read_dir(solution)
-            .map_err(|source| FileError::read(solution, source))?
-            .flatten()
-            .map(|entry| entry.path())
-            .collect();
-        for (k, file) in files.iter().enumerate() {
-            let name = file.file_name().unwrap_or_default();
-            out.tick(k as f64 / files.len() as f64, &name.to_string_lossy());
-            let target = staged.path().join(name);
-            copy_input(file, &target).map_err(|source| FileError::write(&target, source))?;
+    let Entry { name, folder, solution, .. } = entry;
+    match Binned::put(std::iter::once(folder.clone()).chain(solution)) {
+        // It was deleted already, by a click too many or by hand.
+        Ok(binned) if binned.folders.is_empty() => {}
+        Ok(binned) => {
+            out.tell(Update::Scans(Told::Deleted(Deleted { name, folder, binned })));
         }
-        staged.commit()
-    });
-    if copied.is_ok() {
-        out.tell(Update::Scans(Told::Exported(to.to_owned())));
+        Err(error) => out.fail(texts::DELETING, &error),
     }
+}
+
+fn bring_back(deleted: Deleted, out: &Outbox) {
+    match deleted.binned.bring_back() {
+        Ok(()) => out.tell(Update::Scans(Told::BroughtBack(deleted))),
+        Err(error) => out.fail(texts::BRINGING_BACK, &error),
+    }
+}
+
+/// Why maps are not exported.
+#[derive(Debug, thiserror::Error)]
+enum ExportError {
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It would depend on where the program was started.
+    #[error("{path} is a relative path; give the whole one, as in /home/me/maps")]
+    Relative { path: String },
+    /// The copy would be copied.
+    #[error("{path} lies in the solution itself; choose a folder outside of it")]
+    Inside { path: String },
+}
+
+/// Copies a solution; it stands under its name only when whole. Where something is already, it goes beside it, under the next
+/// number.
+fn export(solution: &Path, to: &Path, out: &Outbox) {
+    let copied = out.job(texts::EXPORTING, || copy_solution(solution, to, out));
+    if let Ok(to) = copied {
+        out.tell(Update::Scans(Told::Exported { solution: solution.to_owned(), to }));
+    }
+}
+
+fn copy_solution(solution: &Path, to: &Path, out: &Outbox) -> Result<PathBuf, ExportError> {
+    let path = to.display().to_string();
+    if !to.is_absolute() || to.file_name().is_none() {
+        return Err(ExportError::Relative { path });
+    }
+    if to.ancestors().any(|above| same(above, solution)) {
+        return Err(ExportError::Inside { path });
+    }
+    let files = files_of(solution)?;
+    let to = free_path(to);
+    // One that came there meanwhile is not replaced either.
+    let kind = OutputKind { name: "folder of exported maps", marker: None, ..OUTPUT };
+    let staged = StagedFolder::create(&to, kind)?;
+    for (k, file) in files.iter().enumerate() {
+        let name = file.file_name().unwrap_or_default();
+        out.tick(k as f64 / files.len() as f64, &name.to_string_lossy());
+        let target = staged.path().join(name);
+        copy_input(file, &target).map_err(|source| FileError::write(&target, source))?;
+    }
+    staged.commit()?;
+    Ok(to)
+}
+
+/// The files of a solution. Folders, pipes and devices that a user put there are not copied.
+fn files_of(solution: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let failed = |source| FileError::read(solution, source);
+    let entries = std::fs::read_dir(solution).map_err(failed)?;
+    let mut files = entries
+        .map(|entry| Ok(entry.map_err(failed)?.path()))
+        .collect::<Result<Vec<_>, FileError>>()?;
+    files.retain(|path| path.is_file());
+    files.sort();
+    Ok(files)
 }

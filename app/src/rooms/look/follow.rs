@@ -1,0 +1,203 @@
+//! Which solution is looked at: the last scan's, unless another one is asked for or this one is to stay; and what is offered
+//! where a folder is no solution.
+
+use super::drafts::Drafts;
+use super::edits::Edits;
+use super::{Ask, Look, Opened, Painting, Tool};
+use crate::desk::{Desk, Problem};
+use crate::texts::look as texts;
+use crate::worker::Command;
+use eframe::egui::{self, RichText};
+use std::path::PathBuf;
+
+/// What else there is to look at.
+#[derive(Debug, Default)]
+pub(super) struct Follow {
+    /// The last scan's solution, until it is looked at.
+    newest: Option<PathBuf>,
+    /// What is looked at stays when another scan is solved.
+    pub(super) pinned: bool,
+    /// A capture session that was opened and has no solution.
+    pub(super) unsolved: Option<PathBuf>,
+}
+
+impl Look {
+    /// A scan was solved.
+    pub(super) fn newest(&mut self, solution: PathBuf) {
+        self.follow.newest = Some(solution);
+    }
+
+    /// The room is entered: the last scan's solution is what there is to see.
+    pub fn enter(&mut self, desk: &mut Desk) {
+        let asked = desk.take_opening();
+        if asked || self.follow.pinned && self.opened.is_some() {
+            return;
+        }
+        if let Some(newest) = self.follow.newest.take() {
+            desk.ask(Command::Look(Ask::Open(newest)));
+        }
+    }
+
+    /// What else could be looked at, where there is something.
+    pub(super) fn offers(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if let Some(newest) = self.follow.newest.clone() {
+            let name = newest.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match offer(ui, &texts::newer(&name), texts::SHOW_IT, true) {
+                Some(true) => desk.look_at(newest),
+                Some(false) => self.follow.newest = None,
+                None => {}
+            }
+        }
+        if let Some(scan) = self.follow.unsolved.clone() {
+            let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            match offer(ui, &texts::unsolved(&name), texts::SOLVE_IT, !desk.is_busy()) {
+                Some(true) => {
+                    self.follow.unsolved = None;
+                    let settings = desk.settings.solve;
+                    desk.ask(Command::Look(Ask::SolveScan(scan, settings)));
+                }
+                Some(false) => self.follow.unsolved = None,
+                None => {}
+            }
+        }
+    }
+
+    /// A new solution. The same one solved again keeps how it is looked at, and what was drawn; strokes that were not saved wait
+    /// for their picture to be looked at again.
+    pub(super) fn take(&mut self, opened: Box<Opened>, desk: &mut Desk) {
+        self.finish_stroke();
+        let old = std::mem::take(self);
+        (self.drafts, self.follow.pinned, self.browse) =
+            (old.drafts, old.follow.pinned, old.browse);
+        let before = old.opened.as_deref();
+        let same_key = key_of(before).is_some() && key_of(before) == key_of(Some(&opened));
+        if let (Some(painting), Some(key)) = (old.painting, key_of(before))
+            && (painting.changed || same_key)
+        {
+            self.drafts.put_aside(key.to_owned(), painting);
+        }
+        let same = before.filter(|before| before.folder == opened.folder);
+        if same.is_some_and(|before| before.maps.size() == opened.maps.size()) {
+            self.view = old.view;
+            self.lamp = old.lamp;
+            self.layers = old.layers.of_one_solution();
+            (self.tool, self.canvas, self.line) = (old.tool, old.canvas, old.line);
+            self.edits = old.edits;
+        } else {
+            self.lamp.hang_over(&opened.maps.geometry);
+        }
+        self.opened = Some(opened);
+        self.take_up_painting(desk);
+        self.measure();
+        if matches!(self.tool, Tool::Brush | Tool::Lasso) && !self.can_mask() {
+            self.tool = Tool::Hand;
+        }
+        desk.go_to(crate::rooms::Room::Look);
+    }
+
+    /// Strokes of this picture: those of this window, else those that an earlier one has left on the disk.
+    fn take_up_painting(&mut self, desk: &mut Desk) {
+        let opened = self.opened.as_deref();
+        let Some(key) = key_of(opened).map(str::to_owned) else { return };
+        let size = opened.map(|opened| opened.maps.size());
+        let of_disk = opened.and_then(Opened::capture).and_then(|capture| capture.mask.clone());
+        let fits = |painting: &Painting| {
+            let mask = painting.mask();
+            size == Some([mask.width, mask.height])
+        };
+        match self.drafts.take(&key) {
+            // Where another mask took the place of one that was saved, that one counts.
+            Some(painting)
+                if fits(&painting)
+                    && (painting.changed
+                        || of_disk.is_some_and(|mask| *mask == *painting.mask())) =>
+            {
+                self.edits.begin_with(painting.steps());
+                self.painting = Some(painting);
+            }
+            Some(painting) if painting.changed => self.drafts.put_aside(key, painting),
+            _ => {
+                self.edits.forget_mask();
+                self.awaits_draft = true;
+                let file = Drafts::file(&desk.settings.drafts(), &key);
+                desk.ask(Command::Look(Ask::Draft(file)));
+            }
+        }
+    }
+
+    /// What an earlier window left of this picture: one step that can be undone.
+    pub(super) fn take_draft(
+        &mut self,
+        file: PathBuf,
+        draft: Option<weavelight_calibration::description::Image<bool>>,
+        desk: &mut Desk,
+    ) {
+        let opened = self.opened.as_deref();
+        let of_this = key_of(opened).map(|key| Drafts::file(&desk.settings.drafts(), key));
+        if of_this != Some(file) {
+            return;
+        }
+        self.awaits_draft = false;
+        let (Some(draft), Some(opened)) = (draft, opened) else { return };
+        let mask = opened.capture().and_then(|capture| capture.mask.as_ref());
+        let mut painting = Painting::new(opened.maps.size(), mask);
+        if painting.replace(&draft) {
+            self.painting = Some(painting);
+            self.edits = Edits::default();
+            self.edits.changed_mask();
+            desk.tell(Problem::warning(texts::MASK, texts::DRAFT_IS_BACK));
+        } else if let Some(key) = key_of(self.opened.as_deref()) {
+            // It is what is on the disk.
+            self.drafts.forget(&desk.settings.drafts(), key);
+        }
+    }
+
+    /// Keeps strokes on the disk until they are saved.
+    pub(super) fn keep_draft(&mut self, desk: &mut Desk) {
+        if let Some(text) = self.drafts.trouble() {
+            desk.tell(Problem::error(texts::KEEPING_STROKES, text));
+        }
+        let key = key_of(self.opened.as_deref()).map(str::to_owned);
+        if let (Some(painting), Some(key)) = (&mut self.painting, key)
+            && painting.changed
+            && painting.kept != painting.version
+        {
+            painting.kept = painting.version;
+            self.drafts.keep(&desk.settings.drafts(), &key, painting.mask());
+        }
+    }
+
+    /// A mask is on the disk; strokes that came since are not.
+    pub(super) fn mask_saved(&mut self, key: &str, version: u64, desk: &Desk) {
+        let folder = desk.settings.drafts();
+        if key_of(self.opened.as_deref()) != Some(key) {
+            if let Some(mut painting) = self.drafts.take(key) {
+                if painting.version != version {
+                    return self.drafts.put_aside(key.to_owned(), painting);
+                }
+                painting.changed = false;
+            }
+            return self.drafts.forget(&folder, key);
+        }
+        if let Some(painting) = self.painting.as_mut().filter(|of| of.version == version) {
+            painting.changed = false;
+            self.drafts.forget(&folder, key);
+        }
+    }
+}
+
+/// What the strokes of a solution's picture are kept under.
+fn key_of(opened: Option<&Opened>) -> Option<&str> {
+    opened?.capture().map(|capture| capture.key.as_str())
+}
+
+/// A sentence and what can be done: true for that, false for not now.
+fn offer(ui: &mut egui::Ui, text: &str, action: &str, enabled: bool) -> Option<bool> {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(text).strong());
+        let act = ui.add_enabled(enabled, egui::Button::new(action)).clicked();
+        let not_now = ui.button(texts::NOT_NOW).clicked();
+        act.then_some(true).or(not_now.then_some(false))
+    })
+    .inner
+}

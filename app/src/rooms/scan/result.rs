@@ -1,0 +1,108 @@
+//! What came of a scan, and what can be done with it: all of it about the scan that is shown, not about what the form says.
+
+use super::again::Swapped;
+use super::form::order;
+use super::{About, Ask, Order, Scan, Stage, What};
+use crate::desk::Desk;
+use crate::place::{Place, same};
+use crate::worker::Command;
+use crate::{texts::scan as texts, theme, widgets};
+use eframe::egui::{self, RichText};
+use std::path::PathBuf;
+use weavelight::solution::Report;
+
+impl Scan {
+    /// What came of the scan, and what to do with it.
+    pub(super) fn result(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let name = self.about.as_ref().map_or("", |about| about.name.as_str());
+        let (good, text) = match &self.stage {
+            Stage::Scanned(Some(summary)) => (summary.warnings.is_empty(), texts::scanned(summary)),
+            Stage::Scanned(None) => (true, texts::brought_back(name)),
+            Stage::Solved { report, expected_deg, .. } => {
+                (is_good(report), texts::solved(report, *expected_deg))
+            }
+            _ => return,
+        };
+        let sign = if good { widgets::Sign::Good } else { widgets::Sign::Warning };
+        ui.horizontal_wrapped(|ui| {
+            sign.ui(ui);
+            ui.label(RichText::new(text).strong());
+            self.next_steps(ui, desk);
+        });
+    }
+
+    fn next_steps(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        if let Stage::Solved { solution, .. } = &self.stage
+            && ui.button(texts::LOOK_CLOSER).on_hover_text(texts::ENTER).clicked()
+        {
+            desk.look_at(solution.clone());
+        }
+        if desk.is_busy() {
+            return;
+        }
+        let folder = self.about.as_ref().and_then(|about| about.folder.clone());
+        let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
+        if let (Stage::Scanned(_), Some(scan), true) = (&self.stage, folder, calibrated)
+            && ui.button(texts::SOLVE).clicked()
+        {
+            let settings = desk.settings.solve;
+            desk.ask(Command::Scan(Ask::Solve { scan, settings }));
+        }
+        if let Some(order) = self.again(desk)
+            && ui.button(texts::REPEAT).on_hover_text(texts::REPEAT_HINT).clicked()
+        {
+            self.begin(order, desk);
+        }
+    }
+
+    /// The order that takes the scan that is shown once more: as the form says, as long as that is still about this scan, else
+    /// as it was taken. `None` where it is no scan of this rig.
+    fn again(&self, desk: &Desk) -> Option<Order> {
+        let About { name, folder, order: taken } = self.about.as_ref()?;
+        let scan: PathBuf = folder.clone()?;
+        let ours = |place: &Place| scan.parent().is_some_and(|parent| same(parent, &place.scans()));
+        if !desk.place.as_ref().is_some_and(ours) {
+            return None;
+        }
+        let form = order(desk);
+        let how = if form.name == *name { form } else { taken.clone()? };
+        Some(Order { name: name.clone(), what: What::Again(scan), ..how })
+    }
+
+    /// What was scanned again can be had back, as long as this room is about it.
+    pub(super) fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+        let Some(replaced) = self.replaced.clone().filter(|_| !desk.is_busy()) else { return };
+        let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
+        frame.show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.label(texts::replaced(&replaced.name));
+            if ui.button(texts::UNDO).clicked() {
+                desk.ask(Command::Scan(Ask::Undo(replaced)));
+            }
+        });
+        ui.add_space(theme::GAP);
+    }
+
+    /// The scan of that name that was in the bin is the one that is shown.
+    pub(super) fn swap(&mut self, Swapped { folder, solution, replaced }: Swapped) {
+        self.clear();
+        let of = |about: &About| about.folder.as_ref() == Some(&folder);
+        if !self.about.as_ref().is_some_and(of) {
+            let name = replaced.as_ref().or(self.replaced.as_ref());
+            let name = name.map(|deleted| deleted.name.clone()).unwrap_or_default();
+            self.about = Some(About { name, folder: Some(folder), order: None });
+        }
+        self.stage = match solution {
+            Some((solution, report)) => Stage::Solved { solution, report, expected_deg: None },
+            None => Stage::Scanned(None),
+        };
+        self.replaced = replaced;
+    }
+}
+
+/// Whether a solution can be kept without looking twice: nothing was warned of, and hardly anything clips.
+fn is_good(report: &Report) -> bool {
+    const CLIPPED: f64 = 0.01;
+    let clipped = report.saturated_pixels as f64;
+    report.warnings.is_empty() && clipped <= CLIPPED * report.pixels as f64
+}
