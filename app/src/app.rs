@@ -5,7 +5,7 @@ use crate::keeper::Keeper;
 use crate::problems::Problems;
 use crate::questions::{Answer, Question};
 use crate::rooms::{
-    Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan::Scan, scans::Scans,
+    Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan, scan::Scan, scans::Scans,
     welcome::Welcome,
 };
 use crate::settings::{Settings, Theme};
@@ -125,18 +125,36 @@ impl App {
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
+                desk.held_by = None;
                 desk.problems.retain(|problem| problem.area != Some(Area::Opening));
                 self.scan.reset(desk);
                 self.scans.reset(desk);
                 self.rig.reset(desk);
                 self.calibrate.reset();
             }
+            Update::Held(folder, holder) => self.held(&folder, holder),
             Update::CalibrationAge(days) => desk.calibration_age_days = days,
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),
             Update::Scan(told) => self.scan.hear(told, desk),
             Update::Look(told) => self.look.hear(told, desk),
             Update::Scans(told) => self.scans.hear(told, desk),
+        }
+    }
+
+    /// Another program has taken the rig, or let it go: then what it left is looked at.
+    fn held(&mut self, folder: &std::path::Path, holder: Option<String>) {
+        let desk = &mut self.desk;
+        if desk.place.as_ref().is_none_or(|place| place.folder != folder) {
+            return;
+        }
+        let was_held = desk.held_by.is_some();
+        desk.held_by = holder;
+        if was_held && desk.held_by.is_none() {
+            desk.ask(Command::Scan(scan::Ask::LookForUnfinished));
+            self.scans.is_stale();
+            self.rig.is_stale();
+            self.calibrate.reset();
         }
     }
 
@@ -195,6 +213,13 @@ impl App {
             return self.welcome.ui(ui, &mut self.desk);
         }
         let desk = &mut self.desk;
+        if let Some(holder) = &desk.held_by {
+            ui.horizontal_top(|ui| {
+                widgets::Sign::Warning.ui(ui);
+                ui.add(egui::Label::new(texts::rig::held(holder)).wrap());
+            });
+            ui.separator();
+        }
         match desk.settings.room {
             Room::Rig => self.rig.ui(ui, desk),
             Room::Calibrate => self.calibrate.ui(ui, desk),

@@ -16,6 +16,8 @@ pub struct Desk {
     pub settings: Settings,
     /// The rig that is open.
     pub place: Option<Place>,
+    /// Which other program holds it, in words: then it is looked at only.
+    pub held_by: Option<String>,
     /// How old its calibration is; `None` where there is none.
     pub calibration_age_days: Option<i64>,
     /// What the worker is doing.
@@ -151,6 +153,7 @@ impl Desk {
         Self {
             settings,
             place: None,
+            held_by: None,
             calibration_age_days: None,
             activity: None,
             problems: Vec::new(),
@@ -195,6 +198,11 @@ impl Desk {
     /// Whether the worker has something to do that takes its time.
     pub fn is_busy(&self) -> bool {
         self.activity.is_some()
+    }
+
+    /// Whether the rig, its scans and their solutions may be changed now.
+    pub fn can_change(&self) -> bool {
+        !self.is_busy() && self.held_by.is_none()
     }
 
     /// Opens a solution in the Look room.

@@ -140,6 +140,13 @@ pub mod rig {
     /// In place of a place.
     pub const FAR: &str = "far away";
 
+    /// Who else works with the rig.
+    pub fn held(holder: &str) -> String {
+        format!(
+            "This rig is in use by {holder}. It can be looked at; scanning and changes wait until that is done."
+        )
+    }
+
     /// A scan that belongs to no rig.
     pub fn scan_without_rig(scan: &std::path::Path) -> String {
         format!("{} is a scan; open the rig that it was taken with first", scan.display())

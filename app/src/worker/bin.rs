@@ -1,5 +1,6 @@
 //! The system's bin: folders go there and come back as one.
 
+use super::watch::holder;
 use std::path::PathBuf;
 
 /// Folders that are in the bin, and how to find them there again.
@@ -20,6 +21,14 @@ pub enum BinError {
         folder: String,
         /// The system's words.
         why: String,
+    },
+    /// Another program works with it.
+    #[error("{folder} is in use by {holder}; wait until that is done, or stop it")]
+    InUse {
+        /// The folder.
+        folder: String,
+        /// Who, in words.
+        holder: String,
     },
     /// Something stands where a folder is to come back to.
     #[error("{folder} is there again; delete or rename that one first")]
@@ -47,8 +56,13 @@ impl Binned {
     /// Moves folders to the bin: all that are there, or none.
     ///
     /// # Errors
-    /// Where the system does not take one of them; those before it are back then.
+    /// Where another program works with one of them, or the system does not take it; those before it are back then.
     pub fn put(folders: impl IntoIterator<Item = PathBuf>) -> Result<Self, BinError> {
+        let folders: Vec<PathBuf> = folders.into_iter().collect();
+        let held = |folder: &PathBuf| Some((folder.display().to_string(), holder(folder)?));
+        if let Some((folder, holder)) = folders.iter().find_map(held) {
+            return Err(BinError::InUse { folder, holder });
+        }
         let mut binned = Self { folders: Vec::new(), items: Vec::new() };
         for folder in folders.into_iter().filter(|folder| folder.symlink_metadata().is_ok()) {
             let before = ids();

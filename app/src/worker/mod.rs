@@ -8,6 +8,7 @@ pub mod bin;
 pub mod instruments;
 mod job;
 pub mod open;
+pub(crate) mod watch;
 pub(crate) mod what;
 
 pub use job::{Ended, Outbox};
@@ -28,6 +29,8 @@ use weavelight::device::scan::Instruments;
 pub enum Command {
     /// Open the rig in this folder.
     Open(PathBuf),
+    /// Let the rig go: others may use it.
+    Close,
     /// Do what is meant by a folder that was dropped into the window: open the rig, solve the scan, look at the solution.
     Dropped(PathBuf),
     /// Make a simulated rig in this folder, and open it.
@@ -48,7 +51,10 @@ impl Command {
     /// What it belongs to.
     fn area(&self) -> Area {
         match self {
-            Command::Open(_) | Command::Dropped(_) | Command::MakeSimulatedRig(_) => Area::Opening,
+            Command::Open(_)
+            | Command::Close
+            | Command::Dropped(_)
+            | Command::MakeSimulatedRig(_) => Area::Opening,
             Command::Rig(_) => Area::Rig,
             Command::Calibrate(_) => Area::Calibrate,
             Command::Scan(_) => Area::Scan,
@@ -60,6 +66,7 @@ impl Command {
     /// Of which area it is a new try; `None` for what the program asks by itself.
     pub fn tries(&self) -> Option<Area> {
         let by_the_user = match self {
+            Command::Close => false,
             Command::Open(_) | Command::Dropped(_) | Command::MakeSimulatedRig(_) => true,
             Command::Rig(ask) => {
                 !matches!(ask, rig::Ask::ReadCalibration(_) | rig::Ask::Light(None))
@@ -70,7 +77,10 @@ impl Command {
             Command::Scan(ask) => !matches!(ask, scan::Ask::LookForUnfinished),
             Command::Look(ask) => {
                 use look::Ask;
-                matches!(ask, Ask::Open(_) | Ask::Compare(..) | Ask::Mask(..) | Ask::Solve(..))
+                !matches!(
+                    ask,
+                    Ask::Picture(..) | Ask::Residual(..) | Ask::Photosite(..) | Ask::Draft(_)
+                )
             }
             Command::Scans(ask) => !matches!(ask, scans::Ask::List(_) | scans::Ask::Thumbnail(..)),
         };
@@ -112,6 +122,8 @@ pub enum Update {
     GoTo(Room),
     /// A rig is open.
     Opened(Box<Place>),
+    /// Which other program holds the rig in a folder, in words.
+    Held(PathBuf, Option<String>),
     /// How old its calibration is, days.
     CalibrationAge(Option<i64>),
     /// For the Rig room.
@@ -133,6 +145,8 @@ pub struct Tools {
     pub place: Option<Place>,
     /// Its board and camera, opened when first needed and closed with the rig or when they fail.
     pub instruments: Option<Instruments>,
+    /// Looks whether another program holds it.
+    pub watch: Option<watch::Watch>,
     /// What was seen in pictures of targets.
     pub calibrate: calibrate::Memory,
     /// The frames that the Look room asked about last.
@@ -205,6 +219,7 @@ fn act(command: Command, tools: &mut Tools, out: &Outbox) {
     let out = &out.of(command.area());
     match command {
         Command::Open(path) => open::open_path(&path, tools, out),
+        Command::Close => *tools = Tools::default(),
         Command::Dropped(path) => open::dropped(&path, tools, out),
         Command::MakeSimulatedRig(folder) => open::make_simulated(&folder, tools, out),
         Command::Rig(ask) => rig::act(ask, tools, out),

@@ -1,5 +1,6 @@
 //! Opening a rig, and making a simulated one.
 
+use super::watch::Watch;
 use super::what::{What, is_open, rig_of};
 use super::{Outbox, Tools, Update};
 use crate::place::Place;
@@ -17,9 +18,12 @@ pub(crate) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
         Ok(place) => {
             tools.instruments = None;
             tools.place = Some(place.clone());
+            tools.watch = None;
+            let (folder, rig_file) = (place.folder.clone(), place.rig_file());
             let age_days = place.calibration_age_days();
             out.tell(Update::Opened(Box::new(place)));
             out.tell(Update::CalibrationAge(age_days));
+            tools.watch = Some(Watch::start(folder, rig_file, out.clone()));
         }
         Err(error) => out.fail(texts::OPENING, &error),
     }
@@ -41,10 +45,8 @@ pub(super) fn make_simulated(folder: &Path, tools: &mut Tools, out: &Outbox) {
 /// What was dropped is used for what it is.
 pub(super) fn dropped(path: &Path, tools: &mut Tools, out: &Outbox) {
     match What::is(path) {
-        What::Solution(folder) => {
-            out.tell(Update::GoTo(Room::Look));
-            look::act(look::Ask::Open(folder), tools, out);
-        }
+        // The room follows when it is there: entered before, it would ask for the last scan's.
+        What::Solution(folder) => look::act(look::Ask::Open(folder), tools, out),
         What::Scan(scan) => {
             if let (None, Some(rig)) = (&tools.place, rig_of(&scan)) {
                 open(&rig.folder, tools, out);

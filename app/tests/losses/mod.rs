@@ -309,3 +309,52 @@ fn copy(from: &Path, to: &Path) {
         std::fs::copy(file.path(), to.join(file.file_name())).unwrap();
     }
 }
+
+/// A lock as another process holds it.
+fn held_by_another(file: &Path) -> std::fs::File {
+    std::fs::write(file, "program = \"weavelight 0.1.0\"\npurpose = \"rig\"\npid = 1\n").unwrap();
+    let lock = std::fs::File::options().read(true).write(true).open(file).unwrap();
+    lock.lock().unwrap();
+    lock
+}
+
+#[test]
+fn a_rig_that_another_program_holds_is_looked_at_until_it_is_free() {
+    let mut window = window();
+    window.scan_in_the_library("silk 12");
+    let lock = held_by_another(&window.rig().join(".rig.toml.weavelight-lock"));
+    window.until("it is held", |app| app.desk().held_by.is_some());
+    window.enter(Room::Scan);
+    window.harness.get_by_label_contains("in use by weavelight 0.1.0 (rig, process 1)");
+    let disabled = |window: &Window, label: &str| {
+        window.harness.get_by_label(label).accesskit_node().is_disabled()
+    };
+    assert!(disabled(&window, "Scan the swatch") && disabled(&window, "Test shot"));
+    window.enter(Room::Scans);
+    window.click("silk 12, not solved yet");
+    window.until_label("Delete “silk 12”");
+    assert!(disabled(&window, "Delete “silk 12”") && disabled(&window, "Solve"));
+    window.harness.key_press(Key::Delete);
+    window.idle();
+    assert!(window.rig().join("scans/silk 12").exists());
+    drop(lock);
+    window.until("it is free", |app| app.desk().held_by.is_none());
+    scan(&mut window, "Scan the swatch");
+    assert!(window.rig().join("solutions/linen 1/normal.exr").exists());
+}
+
+#[test]
+fn a_scan_that_another_program_takes_is_not_deleted() {
+    let mut window = window();
+    window.scan_in_the_library("silk 12");
+    let folder = window.rig().join("scans/silk 12");
+    let lock = held_by_another(&folder.join(".weavelight-lock"));
+    window.enter(Room::Scans);
+    window.click("silk 12, not solved yet");
+    window.click("Delete “silk 12”");
+    window.idle();
+    let problems = &window.harness.state().desk().problems;
+    assert!(problems.iter().any(|it| it.text.contains("is in use by weavelight")), "{problems:?}");
+    assert!(folder.join("session.toml").exists());
+    drop(lock);
+}

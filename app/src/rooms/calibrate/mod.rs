@@ -161,7 +161,7 @@ impl Calibrate {
         ui.heading(crate::texts::rooms::CALIBRATE);
         let now = self.wanted().and_then(Task::step);
         let Some(state) = &self.state else { return };
-        let free = !desk.is_busy();
+        let free = desk.can_change();
         let mut wanted = None;
         for step in Step::ALL {
             let figures = self.figures[step as usize].as_deref();
@@ -212,13 +212,14 @@ impl Calibrate {
     }
 
     fn buttons(&mut self, ui: &mut egui::Ui, task: Task, simulated: bool, desk: &mut Desk) {
-        let busy = desk.is_busy();
+        let busy = !desk.can_change();
         let is_fit = matches!(task, Task::Fit(_));
         ui.horizontal(|ui| {
             let text = if is_fit { texts::FIT } else { texts::TAKE };
             let size = egui::vec2(220.0, theme::BIG);
             // While it looks, the picture that is wanted comes right after.
-            let free_to_go = !busy || (self.live.on && !self.live.taking);
+            let looking = self.live.on && !self.live.taking && desk.held_by.is_none();
+            let free_to_go = !busy || looking;
             let clicked = widgets::primary(ui, text, size, free_to_go).clicked();
             let free = ui.is_enabled() && !ui.ctx().egui_wants_keyboard_input();
             let space = free && widgets::struck(ui, egui::Key::Space);

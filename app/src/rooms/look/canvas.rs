@@ -398,9 +398,9 @@ impl Look {
 }
 
 impl Canvas {
-    /// Whether strokes take away: as chosen, else so that the first one changes something.
+    /// Whether strokes take away: as chosen, else they do, so that the first one over the cloth changes something.
     pub(super) fn erases(&self, painting: Option<&super::Painting>) -> bool {
-        self.erases.unwrap_or_else(|| painting.is_none_or(super::Painting::is_whole))
+        self.erases.unwrap_or_else(|| painting.is_none_or(|painting| !painting.is_empty()))
     }
 
     pub(super) fn set_erases(&mut self, erases: bool) {

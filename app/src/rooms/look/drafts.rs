@@ -8,7 +8,8 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 use std::time::Duration;
 use weavelight::files::{FileError, sha256_hex, write_atomic};
-use weavelight::raster::{encode_png_grey8, read_mask};
+use weavelight::machine::spawn;
+use weavelight::raster::encode_png_grey8;
 use weavelight::session::Session;
 use weavelight_calibration::description::Image;
 
@@ -47,9 +48,12 @@ pub(super) fn key(session: &Session) -> String {
     sha256_hex(text.as_bytes())
 }
 
-/// The strokes in a file; `None` where there are none.
+/// The strokes in a file; `None` where there are none. Unlike a mask they may leave everything out.
 pub(super) fn read(file: &Path) -> Option<Image<bool>> {
-    file.exists().then(|| read_mask(file).ok()).flatten()
+    let picture = image::open(file).ok()?.into_luma8();
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let data = picture.into_raw().into_iter().map(|grey| grey > 0).collect();
+    Some(Image { width, height, data })
 }
 
 impl Drafts {
@@ -99,7 +103,7 @@ impl Writer {
     fn start(folder: PathBuf) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, troubles) = mpsc::channel();
-        let thread = Some(std::thread::spawn(move || write_all(&inbox, &outbox)));
+        let thread = spawn("drafts", move || write_all(&inbox, &outbox)).ok();
         Self { folder, changes: Some(changes), troubles, thread }
     }
 }
@@ -163,7 +167,8 @@ mod tests {
             mask.data[k] = false;
             drafts.keep(&folder, "a", &mask);
         }
-        drafts.keep(&folder, "b", &mask);
+        let nothing = Image::filled(3, 2, false);
+        drafts.keep(&folder, "b", &nothing);
         drop(drafts);
         assert_eq!(read(&Drafts::file(&folder, "a")), Some(mask));
         let mut drafts = Drafts::default();
@@ -171,7 +176,7 @@ mod tests {
         drafts.forget(&folder, "never there");
         drop(drafts);
         assert_eq!(read(&Drafts::file(&folder, "a")), None);
-        assert!(read(&Drafts::file(&folder, "b")).is_some());
+        assert_eq!(read(&Drafts::file(&folder, "b")), Some(nothing));
     }
 
     #[test]

@@ -18,13 +18,19 @@ pub(super) struct Follow {
     /// What is looked at stays when another scan is solved.
     pub(super) pinned: bool,
     /// A capture session that was opened and has no solution.
-    pub(super) unsolved: Option<PathBuf>,
+    unsolved: Option<PathBuf>,
 }
 
 impl Look {
     /// A scan was solved.
     pub(super) fn newest(&mut self, solution: PathBuf) {
         self.follow.newest = Some(solution);
+    }
+
+    /// A capture session was opened that has no solution: it is asked about now.
+    pub(super) fn unsolved(&mut self, scan: PathBuf, desk: &mut Desk) {
+        (self.follow.newest, self.follow.unsolved) = (None, Some(scan));
+        desk.go_to(crate::rooms::Room::Look);
     }
 
     /// The room is entered: the last scan's solution is what there is to see.
@@ -43,14 +49,14 @@ impl Look {
         if let Some(newest) = self.follow.newest.clone() {
             let name = newest.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match offer(ui, &texts::newer(&name), texts::SHOW_IT, true) {
-                Some(true) => desk.look_at(newest),
+                Some(true) => desk.ask(Command::Look(Ask::Open(newest))),
                 Some(false) => self.follow.newest = None,
                 None => {}
             }
         }
         if let Some(scan) = self.follow.unsolved.clone() {
             let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            match offer(ui, &texts::unsolved(&name), texts::SOLVE_IT, !desk.is_busy()) {
+            match offer(ui, &texts::unsolved(&name), texts::SOLVE_IT, desk.can_change()) {
                 Some(true) => {
                     self.follow.unsolved = None;
                     let settings = desk.settings.solve;

@@ -41,12 +41,7 @@ impl Painting {
         &self.mask
     }
 
-    /// Whether nothing is left out.
-    pub fn is_whole(&self) -> bool {
-        self.left_out == 0
-    }
-
-    /// Whether everything is.
+    /// Whether everything is left out.
     pub fn is_empty(&self) -> bool {
         self.left_out == self.mask.data.len()
     }
@@ -221,7 +216,6 @@ mod tests {
     fn outside(painting: &Painting) -> usize {
         let counted = painting.mask().data.iter().filter(|inside| !**inside).count();
         assert_eq!(painting.left_out, counted);
-        assert_eq!(painting.is_whole(), counted == 0);
         assert_eq!(painting.is_empty(), counted == painting.mask().data.len());
         counted
     }

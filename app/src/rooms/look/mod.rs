@@ -244,10 +244,7 @@ impl Look {
             Told::MaskSaved(key, version) => self.mask_saved(&key, version, desk),
             Told::Draft(file, draft) => self.take_draft(file, draft.map(|draft| *draft), desk),
             Told::Newest(solution) => self.newest(solution),
-            Told::Unsolved(scan) => {
-                self.follow.unsolved = Some(scan);
-                desk.go_to(Room::Look);
-            }
+            Told::Unsolved(scan) => self.unsolved(scan, desk),
         }
     }
 

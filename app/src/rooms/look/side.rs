@@ -234,7 +234,7 @@ impl Look {
                 self.edits.changed_mask();
             }
         });
-        let ready = painting.changed && !painting.is_empty() && !desk.is_busy();
+        let ready = painting.changed && !painting.is_empty() && desk.can_change();
         let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
         if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
             let (sources, key) = (capture.sources.clone(), capture.key.clone());

@@ -10,7 +10,7 @@ use crate::worker::what::{What, is_open, newest_solution};
 use crate::worker::{Outbox, Tools, Update};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use weavelight::files::{FileError, write_atomic};
+use weavelight::files::{FileError, Lock, write_atomic};
 use weavelight::raster::encode_png_grey8;
 use weavelight::report::page_of_solve;
 use weavelight::session::Session;
@@ -187,6 +187,7 @@ fn scene<'t>(
 /// picture that the manifest does not name is another one, and stays.
 fn save_mask(session: &Path, stroked: Stroked, tools: &mut Tools, out: &Outbox) {
     let saved = || -> Result<(), Box<dyn std::error::Error>> {
+        let _lock = Lock::acquire(session, "edit")?;
         let mut manifest = Session::load(session)?;
         let file = mask_file(&manifest);
         let path = session.join(&file);

@@ -87,7 +87,7 @@ impl Rig {
         ui.label(camera);
         ui.separator();
         let find = egui::Button::new(texts::FIND);
-        if ui.add_enabled(!desk.is_busy(), find).on_hover_text(texts::FIND_HINT).clicked() {
+        if ui.add_enabled(desk.can_change(), find).on_hover_text(texts::FIND_HINT).clicked() {
             desk.ask(Command::Rig(Ask::Find));
         }
         match &self.found {
@@ -106,6 +106,8 @@ impl Rig {
         ui.separator();
         if ui.button(texts::OTHER_RIG).clicked() {
             desk.place = None;
+            desk.held_by = None;
+            desk.ask(Command::Close);
             desk.settings.rig = None;
         }
     }
@@ -115,7 +117,7 @@ impl Rig {
         let lamps = self.lamps(&place.rig);
         ui.horizontal(|ui| {
             ui.heading(texts::LIGHTS);
-            let free = !desk.is_busy();
+            let free = desk.can_change();
             if ui.add_enabled(free, egui::Button::new(texts::TEST_EACH)).clicked() {
                 desk.ask(Command::Rig(Ask::TestEach));
             }
@@ -138,7 +140,7 @@ impl Rig {
             clicked = clicked.or(self.table(ui, &lamps));
             widgets::reveal_focus(ui);
         });
-        if let Some(light) = clicked.filter(|_| !desk.is_busy()) {
+        if let Some(light) = clicked.filter(|_| desk.can_change()) {
             let wanted = (self.lit != Some(light)).then_some(light);
             desk.ask(Command::Rig(Ask::Light(wanted)));
         }

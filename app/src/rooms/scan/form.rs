@@ -141,7 +141,7 @@ impl Form {
         let lights = desk.place.as_ref().map_or(0, |place| place.rig.lights.len());
         ui.horizontal(|ui| {
             let clicked = ui
-                .add_enabled(!desk.is_busy(), egui::Button::new(texts::TEST_SHOT))
+                .add_enabled(desk.can_change(), egui::Button::new(texts::TEST_SHOT))
                 .on_hover_text(texts::TEST_SHOT_HINT)
                 .clicked();
             let label = ui.label(texts::LIGHT);
@@ -169,7 +169,7 @@ impl Form {
         };
         let clicked = button.clicked();
         let taken = !done && desk.taken.has(desk.settings.scan.name.trim());
-        let hint = match (desk.is_busy(), taken, self.unread && !done) {
+        let hint = match (!desk.can_change(), taken, self.unread && !done) {
             (true, ..) => texts::BUSY,
             (_, true, _) => texts::TAKEN,
             (.., true) => texts::UNREAD,
@@ -183,7 +183,7 @@ impl Form {
     pub(super) fn can_go(&self, desk: &Desk, done: bool) -> bool {
         let name = desk.settings.scan.name.trim();
         let free = !name.is_empty() && !desk.taken.has(name);
-        !desk.is_busy() && (done || (free && !self.unread))
+        desk.can_change() && (done || (free && !self.unread))
     }
 }
 

@@ -288,7 +288,7 @@ impl Scan {
 
     /// A scan that was stopped by whatever, first thing to be seen.
     fn offer_unfinished(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some(found) = self.unfinished.clone().filter(|_| !desk.is_busy()) else { return };
+        let Some(found) = self.unfinished.clone().filter(|_| desk.can_change()) else { return };
         let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
         frame.show(ui, |ui| {
             ui.set_width(ui.available_width());

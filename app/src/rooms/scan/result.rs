@@ -37,7 +37,7 @@ impl Scan {
         {
             desk.look_at(solution.clone());
         }
-        if desk.is_busy() {
+        if !desk.can_change() {
             return;
         }
         let folder = self.about.as_ref().and_then(|about| about.folder.clone());
@@ -71,7 +71,7 @@ impl Scan {
 
     /// What was scanned again can be had back, as long as this room is about it.
     pub(super) fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some(replaced) = self.replaced.clone().filter(|_| !desk.is_busy()) else { return };
+        let Some(replaced) = self.replaced.clone().filter(|_| desk.can_change()) else { return };
         let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
         frame.show(ui, |ui| {
             ui.set_width(ui.available_width());

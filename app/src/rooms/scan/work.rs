@@ -8,7 +8,7 @@ use crate::rooms::look;
 use crate::rooms::scans::{Unfinished, incomplete};
 use crate::settings::SolveSettings;
 use crate::texts::scan as texts;
-use crate::worker::{Outbox, Tools, Update, instruments::with_instruments};
+use crate::worker::{Outbox, Tools, Update, instruments::with_instruments, watch::holder};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use weavelight::device::camera::Settings;
@@ -271,7 +271,9 @@ fn tell_taken(place: &Place, out: &Outbox) {
 fn newest_unfinished(place: &Place) -> Option<Unfinished> {
     let entries = std::fs::read_dir(place.scans()).ok()?.flatten();
     let found = entries.filter_map(|entry| {
-        let session = incomplete(&entry.path(), &place.rig)?;
+        // One that another program is taking is not stopped.
+        let session =
+            incomplete(&entry.path(), &place.rig).filter(|_| holder(&entry.path()).is_none())?;
         Some((entry.metadata().ok()?.modified().ok()?, session))
     });
     found.max_by_key(|(when, _)| *when).map(|(_, found)| found)

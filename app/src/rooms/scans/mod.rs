@@ -186,7 +186,7 @@ impl Scans {
     /// What was deleted last can be had again: with the button, or Control and Z.
     fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         let Some(last) = self.deleted.last().cloned() else { return };
-        let idle = !desk.is_busy();
+        let idle = desk.can_change();
         let clicked = ui.horizontal(|ui| {
             ui.label(texts::in_the_bin(&last.name));
             let undo = egui::Button::new(texts::UNDO);
@@ -226,7 +226,7 @@ impl Scans {
         } else if let Some(solution) = entry.solution.clone().filter(|_| export) {
             let to = export_folder(&entry, desk);
             desk.ask(Command::Scans(Ask::Export { solution, to }));
-        } else if pressed(Key::Delete) && !desk.is_busy() {
+        } else if pressed(Key::Delete) && desk.can_change() {
             self.chosen = None;
             desk.ask(Command::Scans(Ask::Delete(entry)));
         }
@@ -310,7 +310,7 @@ impl Scans {
         });
         ui.separator();
         ui.with_layout(egui::Layout::top_down_justified(egui::Align::Min), |ui| {
-            let idle = !desk.is_busy();
+            let idle = desk.can_change();
             if ui.add_enabled(entry.solution.is_some(), egui::Button::new(texts::OPEN)).clicked() {
                 open(entry, desk);
             }
@@ -329,7 +329,7 @@ impl Scans {
 
     fn solve(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
         let again = if entry.solution.is_some() { texts::SOLVE_AGAIN } else { texts::SOLVE };
-        let can = !desk.is_busy() && entry.frames[0] > 0;
+        let can = desk.can_change() && entry.frames[0] > 0;
         let mut reuse = None;
         if ui.add_enabled(can, egui::Button::new(again)).clicked() {
             reuse = Some(Reuse::IfCurrent);
@@ -373,7 +373,7 @@ impl Scans {
         match told {
             Told::List(of, entries) => {
                 if desk.place.as_ref().is_some_and(|place| place.folder == of) {
-                    self.entries = Some(entries);
+                    self.take(entries);
                 }
             }
             Told::Thumbnail(folder, picture) => {
@@ -389,6 +389,17 @@ impl Scans {
             Told::Solved(scan, up_to_date) => self.up_to_date = up_to_date.then_some(scan),
             Told::Exported { solution, to } => self.said = Some((solution, texts::exported(&to))),
         }
+    }
+
+    /// A scan that was taken again has another picture.
+    fn take(&mut self, entries: Vec<Entry>) {
+        for entry in self.entries.iter().flatten() {
+            let same = |new: &Entry| new.folder == entry.folder && new.captured == entry.captured;
+            if !entries.iter().any(same) {
+                self.pictures.remove(&entry.folder);
+            }
+        }
+        self.entries = Some(entries);
     }
 
     /// Another rig, or another set of scans.

@@ -10,10 +10,9 @@ use crate::texts::scans as texts;
 use crate::worker::{Outbox, Tools, Update, bin::Binned};
 use eframe::egui::ColorImage;
 use std::path::{Path, PathBuf};
-use weavelight::files::{FileError, OutputKind, StagedFolder, copy_input};
+use weavelight::files::{FileError, LIST_FILE, OutputKind, StagedFolder, copy_input};
 use weavelight::instrument::Calibration;
 use weavelight::session::Session;
-use weavelight::solution::OUTPUT;
 
 pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
     match ask {
@@ -129,7 +128,7 @@ fn copy_solution(solution: &Path, to: &Path, out: &Outbox) -> Result<PathBuf, Ex
     let files = files_of(solution)?;
     let to = free_path(to);
     // One that came there meanwhile is not replaced either.
-    let kind = OutputKind { name: "folder of exported maps", marker: None, ..OUTPUT };
+    let kind = OutputKind { name: "folder of exported maps", marker: None };
     let staged = StagedFolder::create(&to, kind)?;
     for (k, file) in files.iter().enumerate() {
         let name = file.file_name().unwrap_or_default();
@@ -148,7 +147,9 @@ fn files_of(solution: &Path) -> Result<Vec<PathBuf>, FileError> {
     let mut files = entries
         .map(|entry| Ok(entry.map_err(failed)?.path()))
         .collect::<Result<Vec<_>, FileError>>()?;
-    files.retain(|path| path.is_file());
+    // The copy gets a list of its own.
+    let ours = |path: &PathBuf| path.file_name().is_some_and(|name| name == LIST_FILE);
+    files.retain(|path| path.is_file() && !ours(path));
     files.sort();
     Ok(files)
 }
