@@ -57,7 +57,12 @@ pub(super) enum Refused {
 /// larger than its kind allows, or it cannot be read.
 pub fn read_input(path: &Path, kind: InputKind) -> io::Result<Vec<u8>> {
     let (file, metadata) = open(path)?;
-    let (size, most) = (metadata.len(), kind.most_bytes());
+    read_within(file, metadata.len(), kind)
+}
+
+/// Reads what is there, as far as its kind allows; `size`: what the system says of it, 0 where it says nothing.
+fn read_within(file: impl Read, size: u64, kind: InputKind) -> io::Result<Vec<u8>> {
+    let most = kind.most_bytes();
     if size > most {
         return Err(refuse(Refused::TooLarge { bytes: size, most, what: kind.what() }));
     }
@@ -265,8 +270,9 @@ mod tests {
     #[test]
     fn files_without_a_size_are_read_up_to_a_limit() {
         assert!(!read_input_text(Path::new("/proc/self/status")).unwrap().is_empty());
-        // The whole address space, eight bytes for each page.
-        let said = error(Path::new("/proc/self/pagemap"), InputKind::Picture);
-        assert!(said.contains("does not say its size and holds over 1.0 MB"), "{said}");
+        let endless = read_within(io::repeat(7), 0, InputKind::Picture).unwrap_err().to_string();
+        assert!(endless.contains("does not say its size and holds over 1.0 MB"), "{endless}");
+        let growing = read_within(io::repeat(7), 1, InputKind::Text).unwrap_err().to_string();
+        assert!(growing.contains("too much for a text file"), "{growing}");
     }
 }

@@ -95,7 +95,7 @@ fn camera(value: Value) -> impl Strategy<Value = MeasuredCamera> {
         value(&quantity::DISTORTION),
         [value(&quantity::PLACE_MM), value(&quantity::CAMERA_HEIGHT_MM)],
         proptest::option::of(value(&quantity::REPROJECTION_PX)),
-        1usize..70_000,
+        1usize..=65_535,
     )
         .prop_map(|([fx, fy], [cx, cy], k1, [x, z], rms_reprojection_px, width_px)| {
             let translation = Translation3::new(x, 0.0, z);
