@@ -5,6 +5,7 @@
 # make firmware the light board's firmware, and the simulated board that tests run it in
 # make soak    light board and host for fifteen minutes over a bad wire
 # make kills   the program killed two hundred times while it scans, at the simulated board
+# make attacks mutated files, kills and errors at system calls, two processes on every output, by the thousand
 # make scan-timing   wall time of a scan of full-size frames beside exposure and transfer
 # make tether-timing the same through libgphoto2, with a camera that speaks PTP/IP
 # make bench   run time against error and against touching the bytes once; the window's frames
@@ -23,13 +24,16 @@ WINDOW_PACKAGES := libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 
-.PHONY: demo test build install bench soak kills scan-timing tether-timing firmware packages-demo packages-all packages-firmware
+# Kills and errors at chosen system calls.
+ATTACK_PACKAGES := strace
+
+.PHONY: demo test build install bench soak kills attacks scan-timing tether-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
 
 packages-all:
-	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES) $(TETHER_PACKAGES) $(WINDOW_PACKAGES) $(VULKAN_PACKAGES)
+	@bash .ci/packages $(LINKER_PACKAGES) $(OPENCV_PACKAGES) $(TETHER_PACKAGES) $(WINDOW_PACKAGES) $(VULKAN_PACKAGES) $(ATTACK_PACKAGES)
 
 packages-firmware:
 	@bash .ci/packages $(LINKER_PACKAGES) $(FIRMWARE_PACKAGES)
@@ -72,6 +76,15 @@ soak: packages-all firmware
 KILLS ?= 200
 kills: packages-all firmware
 	WEAVELIGHT_KILLS=$(KILLS) cargo test --locked --release --test scan -- --ignored --nocapture two_hundred_kills
+
+# Some twenty minutes; the numbers of tries can be given.
+MUTATIONS ?= 5000
+KILLS_PER_CALL ?= 20
+ERRORS_PER_CALL ?= 25
+PAIRS ?= 10
+attacks: packages-all
+	WEAVELIGHT_MUTATIONS=$(MUTATIONS) WEAVELIGHT_KILLS_PER_CALL=$(KILLS_PER_CALL) WEAVELIGHT_ERRORS_PER_CALL=$(ERRORS_PER_CALL) \
+	    WEAVELIGHT_PAIRS=$(PAIRS) cargo test --locked --release --test attacks -- --nocapture
 
 scan-timing: packages-all firmware
 	cargo test --locked --release --test scan -- --ignored --nocapture ten_full_size_frames
