@@ -156,14 +156,19 @@ pub(crate) fn leftovers(folder: &Path) -> Vec<PathBuf> {
     content(folder).into_keys().filter(partial).collect()
 }
 
-/// Whether every file that `.weavelight-files` lists is there as it was written.
+/// Whether every file that `.weavelight-files` lists is there as it was written. A file that was being replaced is listed with
+/// both hashes.
 pub(crate) fn check_whole(folder: &Path) -> Result<(), String> {
-    let list = fs::read_to_string(folder.join(".weavelight-files"))
+    let list = fs::read_to_string(folder.join(weavelight::files::LIST_FILE))
         .map_err(|error| format!("{}: no list of files: {error}", folder.display()))?;
-    for line in list.lines().filter(|line| !line.is_empty() && !line.starts_with('#')) {
+    let mut hashes: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    for line in list.lines() {
         let (hash, name) = line.split_once("  ").ok_or_else(|| format!("odd line {line:?}"))?;
+        hashes.entry(name).or_default().push(hash);
+    }
+    for (name, hashes) in hashes {
         let found = weavelight::files::sha256_of_file(&folder.join(name));
-        if found.map_err(|error| error.to_string())? != hash {
+        if !hashes.contains(&&*found.map_err(|error| error.to_string())?) {
             return Err(format!("{name} is not as it was written"));
         }
     }
