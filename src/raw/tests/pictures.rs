@@ -148,7 +148,7 @@ fn what_is_no_picture_is_refused() {
     check_refused(b"", NOTHING, "empty");
     check_refused(b"these are my notes on linen\nand more\n", NOTHING, "a text file");
     check_refused("Notizen über Köper, nicht über Leinen".as_bytes(), NOTHING, "a text file");
-    check_refused(&[0; 5000], NOTHING, "cannot be read");
+    check_refused(&[0; 5000], NOTHING, "a file of unknown kind, not a picture");
     check_refused(b"II*\0", NOTHING, "damaged");
     check_refused(b"\x89PNG\r\n\x1a\n", NOTHING, "damaged");
     check_refused(b"\xff\xd8\xff\xe0", NOTHING, "damaged");

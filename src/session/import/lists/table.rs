@@ -70,7 +70,7 @@ pub(in super::super) fn read(
 fn rows(path: &Path, lines: &[&Numbered], columns: usize) -> Result<Vec<Row>, FileError> {
     let mut furthest: Option<&Numbered> = None;
     for separator in [Separator::Semicolon, Separator::Tab, Separator::Space, Separator::Comma] {
-        let headed = lines.first().is_some_and(|(_, line)| is_heading(line, separator));
+        let headed = lines.first().is_some_and(|(_, line)| is_heading(line));
         let body = &lines[usize::from(headed)..];
         let parsed: Result<Vec<Row>, &Numbered> =
             body.iter().map(|line| row(line, separator, columns).ok_or(*line)).collect();
@@ -308,13 +308,17 @@ fn unquoted(name: &str) -> &str {
     inner().unwrap_or(name)
 }
 
-/// Words alone, none of them a number or a picture's name.
-fn is_heading(line: &str, separator: Separator) -> bool {
-    tokens(line, separator).iter().all(|token| {
-        token.number(separator).is_none()
-            && !token.is_picture()
-            && token.text().chars().any(char::is_alphabetic)
-            && !["nan", "inf", "-inf", "-nan"].contains(&token.text().to_lowercase().as_str())
+/// Words alone, however they are separated, none of them a number or a picture's name.
+fn is_heading(line: &str) -> bool {
+    tokens(&line.replace(';', " "), Separator::Space).iter().all(|token| {
+        let words = || token.text().split(',').filter(|word| !word.is_empty());
+        let is_word = |word: &str| {
+            // "nan", "inf" and "1e5" are numbers.
+            word.chars().any(char::is_alphabetic)
+                && word.parse::<f64>().is_err()
+                && !is_picture_name(word)
+        };
+        !token.is_picture() && words().all(is_word)
     })
 }
 

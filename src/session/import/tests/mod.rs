@@ -269,9 +269,9 @@ fn a_capture_session_is_never_replaced() {
 fn pictures_that_say_their_encoding_are_read_by_it() {
     let names = ["a.png", "b.png", "c.png"];
     let set = Set::new("lights.txt", DIRECTIONS, &names);
-    for name in names {
+    for (k, name) in names.iter().enumerate() {
         write_png_rgb16(&set.path(name), [4, 3], PngContent::Srgb, |y, row| {
-            row.fill([1000 * y as u16; 3]);
+            row.fill([(1000 * y + 100 * k) as u16; 3]);
         })
         .unwrap();
     }
