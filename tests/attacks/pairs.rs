@@ -71,7 +71,7 @@ fn two_processes_on_every_output() {
             let b = start(second);
             let ended = [wait(a, first), wait(b, second)];
             done += 1;
-            let mut check = || -> Result<(), String> {
+            let check = || -> Result<(), String> {
                 for one in &ended {
                     check_manners(one)?;
                 }
