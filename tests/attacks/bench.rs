@@ -25,7 +25,7 @@ impl Bench {
     pub(crate) fn new() -> Self {
         let home = tempfile::tempdir().unwrap();
         let bench = Self { home };
-        let rig = "simulate --out rig --size 38x26 --only swatch,grey";
+        let rig = "simulate --out rig --size 76x52 --only swatch,grey";
         for call in [rig, "solve rig/swatch --calibration rig/calibration --out maps"] {
             let ended = bench.run(call);
             assert!(ended.status.success(), "{call}: {}", ended.said);

@@ -29,6 +29,12 @@ fn fill(exposure: &mut Exposure, seed: u64, noise: f64, level: &dyn Fn(usize) ->
     }
 }
 
+/// The ambient light at a photosite, as the recipe has it under each filter, in raw numbers.
+fn room_light(at: usize) -> f64 {
+    let channel = Cfa::RGGB.channel(at % WIDTH, at / WIDTH) as usize;
+    600.0 + [0.02, 0.015, 0.01][channel] * 0.5 * 64_400.0
+}
+
 fn error_of(mut scene: Scene) -> String {
     let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
     assert!(error.lines().count() <= 2, "{error}");
@@ -72,14 +78,9 @@ fn half_of_the_lights_dark_leaves_the_maps_of_the_others() {
     let mut without = scene.clone();
     without.lights.retain(|light| light.index % 2 == 0);
     let known = solve(&without, Method::Auto);
-    // The ambient light under each filter, as the recipe has it.
     for light in scene.lights.iter_mut().filter(|light| light.index % 2 == 1) {
         let seed = light.index as u64;
-        let level = |at: usize| {
-            let channel = Cfa::RGGB.channel(at % WIDTH, at / WIDTH) as usize;
-            600.0 + [0.02, 0.015, 0.01][channel] * 0.5 * 64_400.0
-        };
-        fill(&mut light.exposures[0], seed, 6.0, &level);
+        fill(&mut light.exposures[0], seed, 6.0, &room_light);
     }
     let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
     assert!(
@@ -93,7 +94,8 @@ fn half_of_the_lights_dark_leaves_the_maps_of_the_others() {
 fn with_fewer_than_three_lit_lights_there_is_an_error() {
     let mut scene = noisy(plain());
     for light in scene.lights.iter_mut().skip(2) {
-        light.exposures[0].frame.samples = Samples::U16(vec![600; WIDTH * 64]);
+        let seed = light.index as u64;
+        fill(&mut light.exposures[0], seed, 6.0, &room_light);
     }
     let error = error_of(scene);
     for part in ["lights 2, 3, 4, 5, 6, 7, 8 and 9 show no signal above noise", "2 of the three"] {
