@@ -20,7 +20,7 @@ TETHER_PACKAGES := pkg-config clang libclang-dev libgphoto2-dev
 # A graphics processor in software: what the solve's shaders are tested on, and what the window's tests draw with.
 VULKAN_PACKAGES := libvulkan1 mesa-vulkan-drivers
 # The window.
-WINDOW_PACKAGES := libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 xvfb xdotool imagemagick
+WINDOW_PACKAGES := libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 xvfb xdotool xclip openbox imagemagick
 # The light board's firmware, and the simulated processor that its tests run it in.
 FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsimavr-dev libelf-dev
 

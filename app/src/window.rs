@@ -78,20 +78,28 @@ impl Geometry {
                 ctx.send_viewport_cmd(ViewportCommand::InnerSize(size));
             }
         }
-        self.remember(&seen, settings);
+        if !self.remember(&seen, settings) {
+            // A window that nothing happens in draws no frame by itself.
+            ctx.request_repaint_after_secs(SETTLED_S as f32);
+        }
     }
 
-    fn remember(&mut self, seen: &Seen, settings: &mut Settings) {
+    /// Whether the size has settled.
+    fn remember(&mut self, seen: &Seen, settings: &mut Settings) -> bool {
         if seen.size != self.size {
             (self.size, self.since_s) = (seen.size, seen.now_s);
         }
-        if seen.hidden || seen.now_s - self.since_s < SETTLED_S {
-            return;
+        if seen.hidden {
+            return true;
+        }
+        if seen.now_s - self.since_s < SETTLED_S {
+            return false;
         }
         settings.maximized = seen.maximized;
         if !seen.maximized {
             settings.window_size = Some(self.size.round().into());
         }
+        true
     }
 }
 

@@ -102,7 +102,8 @@ fn texts_go_to_other_programs_and_come_from_them() {
     desktop.key("ctrl+c");
     let copied = until("it is on the clipboard", || {
         let mut read = desktop.program("xclip");
-        let output = read.args(["-selection", "clipboard", "-o"]).output().unwrap();
+        let output =
+            read.args(["-selection", "clipboard", "-t", "UTF8_STRING", "-o"]).output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         (!text.is_empty()).then_some(text)
     });
