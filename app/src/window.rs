@@ -71,6 +71,7 @@ impl Geometry {
             };
             (seen, window.monitor_size.map(|points| points * scale))
         });
+        let real = screen.is_some();
         if let Some(screen) = screen.filter(|screen| self.first && screen.min_elem() > 0.0) {
             self.first = false;
             if !seen.maximized {
@@ -78,8 +79,8 @@ impl Geometry {
                 ctx.send_viewport_cmd(ViewportCommand::InnerSize(size));
             }
         }
-        if !self.remember(&seen, settings) {
-            // A window that nothing happens in draws no frame by itself.
+        if !self.remember(&seen, settings) && real {
+            // A window that nothing happens in draws no frame.
             ctx.request_repaint_after_secs(SETTLED_S as f32);
         }
     }
