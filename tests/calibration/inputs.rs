@@ -77,9 +77,8 @@ fn sessions_that_name_what_is_not_there() {
     let none = camera(home.path(), &[]);
     assert!(none.contains("no capture session was given"), "{none}");
     std::fs::write(home.path().join("out"), "mine").unwrap();
-    assert!(
-        camera(home.path(), &["n"]).ends_with("is a file; give a calibration folder with --out")
-    );
+    let file = camera(home.path(), &["n"]);
+    assert!(file.contains("out: is a file; ") && file.ends_with(" with --out"), "{file}");
 }
 
 fn black(picture: &mut Picture) {
