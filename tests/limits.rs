@@ -182,7 +182,13 @@ fn little_memory_is_enough_or_refused() {
     // Without room for stacks of several threads one does all.
     for megabytes in [150, 300, 1000] {
         let call = format!("solve s --calibration c --out maps-{megabytes} --json");
-        limited(&folder, &format!("ulimit -v {}", megabytes * 1024), &call, &[]).json();
+        let said = limited(&folder, &format!("ulimit -v {}", megabytes * 1024), &call, &[]);
+        // The program itself takes more than a hundred where it holds graphics drivers.
+        if megabytes == 150 && said.status != Some(0) {
+            said.expect_failure("150 MB", 1, &["of memory", "ulimit -v"]);
+        } else {
+            said.json();
+        }
     }
     let said = limited(
         &folder,

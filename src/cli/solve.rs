@@ -61,8 +61,8 @@ pub(super) struct Args {
     #[arg(long)]
     residuals: bool,
     /// Threads to use [default: one per core]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    threads: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -177,7 +177,7 @@ impl Args {
         };
         options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
         options.residuals = if self.residuals { Residuals::Write } else { Residuals::Leave };
-        options.threads = self.threads.map(usize::from);
+        options.threads = self.threads.map(|count| usize::try_from(count).unwrap_or(usize::MAX));
         Ok(options)
     }
 

@@ -40,8 +40,16 @@ pub(super) fn clean(target: &Path) {
     }
 }
 
-/// It was never anybody's: nothing is lost with it.
+/// It was never anybody's: nothing is lost with it. The mark goes last: killed in between, the next run still knows it.
 fn remove_unfinished(path: &Path) {
+    for entry in fs::read_dir(path).into_iter().flatten().flatten() {
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        let _ = match entry.file_name() == UNFINISHED {
+            true => Ok(()),
+            false if is_folder => fs::remove_dir_all(entry.path()),
+            false => fs::remove_file(entry.path()),
+        };
+    }
     let _ = fs::remove_dir_all(path);
 }
 

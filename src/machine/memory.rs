@@ -32,7 +32,8 @@ pub fn check_memory(
     remedy: &'static str,
 ) -> Result<(), NoMemory> {
     let Some((available, limit)) = available_bytes() else { return Ok(()) };
-    if needed.saturating_add(BESIDE_BYTES) <= available {
+    let needed = needed.saturating_add(BESIDE_BYTES);
+    if needed <= available {
         return Ok(());
     }
     Err(NoMemory { what: what(), needed, available, limit, remedy })

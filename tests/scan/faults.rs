@@ -362,9 +362,9 @@ fn watched(laboratory: &Laboratory, names: &'static [&'static str]) -> Result<Su
         }
     });
     let waiting = Waiting {
-        arrival: Duration::from_millis(300),
-        partner: Duration::from_millis(200),
-        second: Duration::from_millis(300),
+        arrival: Duration::from_millis(1500),
+        partner: Duration::from_millis(3000),
+        second: Duration::from_millis(1500),
         ..Waiting::default()
     };
     let mut camera = WatchedCamera::new(&folder, None, waiting);
