@@ -333,6 +333,10 @@ fn watched(laboratory: &Laboratory, names: &'static [&'static str]) -> Result<Su
     let folder = laboratory.path("watched");
     std::fs::create_dir(&folder).unwrap();
     let frames = prerendered(&laboratory.rig, &laboratory.scene, &laboratory.path("rig"));
+    for (pins, frame) in &frames {
+        let hash = weavelight::files::sha256_of_file(frame).unwrap();
+        laboratory.log.lock().unwrap().insert(hash, (*pins, *pins));
+    }
     let board = SimulatedBoard::new(10);
     let (seen, target) = (board.clone(), folder.clone());
     let jpeg = laboratory.path("rig/x.jpg");

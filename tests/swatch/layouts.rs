@@ -16,8 +16,10 @@ use weavelight_sim::cloth::Preset;
 const SIZE: [usize; 2] = [264, 176];
 /// float32 and the interpolated light field leave less than this between two ways to one normal, degrees.
 const SAME_DEG: f64 = 2e-3;
-/// Photosites, of a million, at which the residual is so near the limit of the subset test that rounding decides.
-const UNDECIDED_PER_MILLION: usize = 100;
+/// Photosites, of a million, at which two subsets are so nearly as good, or the residual is so near the limit of the subset test,
+/// that rounding decides. Measured: 280 at most (knit, lights in another order); a noise estimate that depends on the layout
+/// changes 4,000 to 40,000.
+const UNDECIDED_PER_MILLION: usize = 500;
 
 /// One of the eight ways to lay a picture.
 #[derive(Clone, Copy, Debug)]
