@@ -69,7 +69,8 @@ fn off_px(shape: &BoardShape, corners_px: &[[f64; 2]], left_out: &[usize]) -> Op
     let factor = Cholesky::new(normal)?;
     let mut square = vec![0.0; unit.len()];
     for axis in 0..2 {
-        let left = |k: usize| unit[k][axis] - mapped(&map, flat(k))[axis];
+        let of_axis = |point: [f64; 2]| point[axis];
+        let left = |k: usize| of_axis(unit[k]) - of_axis(mapped(&map, flat(k)));
         let right = used.iter().fold(DVector::zeros(n), |sum, k| sum + rows[*k].clone() * left(*k));
         let surface = factor.solve(&right);
         for (k, square) in square.iter_mut().enumerate() {

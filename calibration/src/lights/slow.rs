@@ -69,8 +69,8 @@ pub(super) struct Evidence {
 impl SlowErrors {
     pub(super) fn for_lights(lights: usize) -> Self {
         let degree = match lights {
-            0..=MANY_LIGHTS => DEGREE,
-            ..=VERY_MANY_LIGHTS => DEGREE_FOR_MANY,
+            lights if lights <= MANY_LIGHTS => DEGREE,
+            lights if lights <= VERY_MANY_LIGHTS => DEGREE_FOR_MANY,
             _ => DEGREE_FOR_VERY_MANY,
         };
         let rms = GROUPS.map(|group| group.usual().0);
@@ -117,14 +117,14 @@ impl SlowErrors {
         let shares = degrees(0, self.degree).map(|(a, b)| {
             (Self::group_of(a + b), f64::from(u32::try_from((a + b).max(1)).unwrap_or(1)).powi(-2))
         });
-        normalised_shares(shares.collect())
+        normalised_shares(&shares.collect::<Vec<_>>())
     }
 
     /// The same for those that all sheets share.
     pub(super) fn fixed_shares(&self) -> Vec<(Group, f64)> {
         let shares = degrees(1, self.fixed_degree)
             .map(|(a, b)| (Group::Fixed, f64::from(u32::try_from(a + b).unwrap_or(1)).powi(-2)));
-        normalised_shares(shares.collect())
+        normalised_shares(&shares.collect::<Vec<_>>())
     }
 
     fn variance(&self, (group, share): (Group, f64)) -> f64 {
@@ -172,7 +172,7 @@ impl SlowErrors {
 }
 
 /// Shares of a kind sum to 1.
-fn normalised_shares(shares: Vec<(Group, f64)>) -> Vec<(Group, f64)> {
+fn normalised_shares(shares: &[(Group, f64)]) -> Vec<(Group, f64)> {
     let total = |group: Group| {
         shares.iter().filter(|(other, _)| *other == group).map(|(_, share)| share).sum::<f64>()
     };

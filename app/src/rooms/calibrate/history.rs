@@ -4,7 +4,7 @@
 use super::task::Step;
 use crate::place::Place;
 use std::path::{Path, PathBuf};
-use weavelight::files::{FileError, copy_input, exchange};
+use weavelight::files::{FileError, InputKind, copy_input, exchange, read_input};
 use weavelight::instrument::{CAMERA_FILE, COLOR_FILE, LIGHTS_FILE};
 
 /// Something that is kept.
@@ -175,7 +175,7 @@ pub(super) fn restore(place: &Place, entry: &Entry) -> Result<Option<PathBuf>, F
 /// Keeps a copy of the calibration in use before a fit replaces its part of it, unless the history has that part already.
 pub(super) fn keep_before(place: &Place, step: Step) -> Result<(), FileError> {
     let Some(part) = part(step) else { return Ok(()) };
-    let read = |calibration: &Path| std::fs::read(calibration.join(part)).ok();
+    let read = |calibration: &Path| read_input(&calibration.join(part), InputKind::Text).ok();
     let Some(now) = read(&place.calibration()) else { return Ok(()) };
     let kept = |entry: &Entry| {
         read(&folder(place).join(&entry.name).join("calibration")).as_ref() == Some(&now)

@@ -114,7 +114,8 @@ mod tests {
             let mut session = Session::new(&folder, Kind::Swatch, "x");
             for (k, stem) in stems.iter().enumerate() {
                 let light = stem.strip_prefix("light-").map(|light| light[..2].parse().unwrap());
-                let entry = FrameEntry::new(format!("{stem}.dng"), light, 0.1, 100.0);
+                let exposure_s = if stem.contains("exposure") { 0.025 } else { 0.1 };
+                let entry = FrameEntry::new(format!("{stem}.dng"), light, exposure_s, 100.0);
                 let path = session.frame_path(&entry);
                 std::fs::write(&path, if k < lost { "" } else { "frame" }).unwrap();
                 session.frames.push(entry);

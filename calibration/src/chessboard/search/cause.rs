@@ -24,7 +24,9 @@ pub(super) fn hopeless(searched: &Searched, shape: &BoardShape) -> Option<NoBoar
     }
     let [low, high] = searched.range;
     let top = searched.small.data.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
-    if !(high - low > NO_CONTRAST * top.max(high)) {
+    // Nor where nothing is finite.
+    let has_contrast = high - low > NO_CONTRAST * top.max(high);
+    if !has_contrast {
         return Some(NoBoard::NoContrast);
     }
     (!searched.can_hold(shape, 1)).then_some(NoBoard::TooFine)
