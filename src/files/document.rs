@@ -120,9 +120,13 @@ impl Document {
         self.error_at(line, format!("{}; correct this line", message.join(", ")))
     }
 
-    fn error_at(&self, line: usize, what: String) -> FileError {
+    fn error_at(&self, line: usize, what: impl AsRef<str>) -> FileError {
         // Keys and values of the file may be in it, whatever they hold.
-        FileError::Invalid { path: self.path.clone(), line, what: one_line(&what, LONGEST_MESSAGE) }
+        FileError::Invalid {
+            path: self.path.clone(),
+            line,
+            what: one_line(what.as_ref(), LONGEST_MESSAGE),
+        }
     }
 
     fn line_at(&self, offset: usize) -> usize {

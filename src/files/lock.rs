@@ -39,12 +39,12 @@ pub struct Lock {
 
 /// The place is in use by another program, or by another part of this one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}: in use by {}; wait until that is done, or stop it{}", .path.display(), who(.holder.as_ref()), remedy(.holder.as_ref(), .lock_file))]
+#[error("{}: in use by {}; wait until that is done, or stop it{}", .path.display(), who(.holder.as_deref()), remedy(.holder.as_deref(), .lock_file))]
 pub struct LockError {
     /// What was to be locked.
     pub path: PathBuf,
     /// Who holds it; `None` where its file does not say.
-    pub holder: Option<Holder>,
+    pub holder: Option<Box<Holder>>,
     /// The file that records the holder.
     pub lock_file: PathBuf,
 }
@@ -110,6 +110,7 @@ impl Lock {
                     let passing = holder.is_none() || !opened.is_at_its_path();
                     if tries > MOST_TRIES || (tries > TRIES && !passing) {
                         let (path, lock_file) = (path.to_owned(), opened.path.clone());
+                        let holder = holder.map(Box::new);
                         return Err(LockError { path, holder, lock_file });
                     }
                     std::thread::sleep(BETWEEN_TRIES);
@@ -144,7 +145,10 @@ fn lock(opened: &Opened) -> Result<(), ()> {
 pub(super) fn check_free(path: &Path, lock_file: &Path) -> Result<(), LockError> {
     match lock_file::held_by(lock_file) {
         None => Ok(()),
-        holder => Err(LockError { path: path.to_owned(), holder, lock_file: lock_file.to_owned() }),
+        holder => {
+            let (holder, lock_file) = (holder.map(Box::new), lock_file.to_owned());
+            Err(LockError { path: path.to_owned(), holder, lock_file })
+        }
     }
 }
 
@@ -182,7 +186,7 @@ mod tests {
             let lock = Lock::acquire(path, "scan").unwrap();
             let error = Lock::acquire(path, "mask").unwrap_err();
             let holder = Lock::holder(path).unwrap();
-            assert_eq!(error.holder.as_ref(), Some(&holder));
+            assert_eq!(error.holder.as_deref(), Some(&holder));
             assert_eq!((holder.pid, &*holder.purpose), (std::process::id(), "scan"));
             let said = error.to_string();
             let who = format!(

@@ -7,8 +7,8 @@ const fn new(what: &'static str, unit: &'static str, least: f64, most: f64) -> Q
     Quantity { what, unit, least, most, mistaken: &[] }
 }
 
-const fn mistaken(quantity: Quantity, mistaken: &'static [(&'static str, f64)]) -> Quantity {
-    Quantity { mistaken, ..quantity }
+const fn mistaken(quantity: &Quantity, mistaken: &'static [(&'static str, f64)]) -> Quantity {
+    Quantity { mistaken, ..*quantity }
 }
 
 /// Units of length that are written for millimetres.
@@ -19,25 +19,25 @@ pub const SIDE_PX: RangeInclusive<usize> = 1..=65_535;
 
 /// Nominal focal lengths: of a telephone, of a telescope.
 pub const FOCAL_LENGTH_MM: Quantity = mistaken(
-    new("focal lengths", "millimetres", 0.5, 10_000.0),
+    &new("focal lengths", "millimetres", 0.5, 10_000.0),
     &[("metres", 1e3), ("micrometres", 1e-3)],
 );
 /// Distances of photosites: 0.5 micrometres on telephones, 30 on binned sensors; pictures simulated at a few pixels have
 /// over a thousand.
 pub const PIXEL_PITCH_UM: Quantity = mistaken(
-    new("pixels", "micrometres", 0.4, 5_000.0),
+    &new("pixels", "micrometres", 0.4, 5_000.0),
     &[("millimetres", 1e3), ("nanometres", 1e-3)],
 );
 /// The camera over the table.
 pub const CAMERA_HEIGHT_MM: Quantity =
-    mistaken(new("cameras over the table", "millimetres", 5.0, 20_000.0), FOR_MM);
+    mistaken(&new("cameras over the table", "millimetres", 5.0, 20_000.0), FOR_MM);
 /// What a picture spans of the table.
 pub const VIEW_MM: Quantity = new("pictures on the table", "millimetres", 0.05, 20_000.0);
 /// What a pixel spans of the table.
 pub const MM_PER_PX: Quantity = new("pixels on the table", "millimetres", 1e-6, 20_000.0);
 /// A light's distance from the centre of the scan area.
 pub const LIGHT_DISTANCE_MM: Quantity =
-    mistaken(new("lights from the centre of the scan area", "millimetres", 5.0, 20_000.0), FOR_MM);
+    mistaken(&new("lights from the centre of the scan area", "millimetres", 5.0, 20_000.0), FOR_MM);
 /// A light's height; a light under the table lights nothing.
 pub const LIGHT_HEIGHT_MM: Quantity =
     new("lights above the table (z = 0)", "millimetres", 0.1, 20_000.0);
@@ -47,26 +47,26 @@ pub const POSITION_SIGMA_MM: Quantity = new("errors of a place", "millimetres", 
 pub const PLACE_MM: Quantity = new("places on the table", "millimetres", -20_000.0, 20_000.0);
 /// The plane of a swatch or sheet.
 pub const SURFACE_MM: Quantity = mistaken(
-    new("places of a surface", "millimetres", -5_000.0, 5_000.0),
+    &new("places of a surface", "millimetres", -5_000.0, 5_000.0),
     &[("micrometres", 1e-3)],
 );
 /// Entries of directions and normals, before they are made unit vectors.
 pub const DIRECTION: Quantity = new("parts of a direction", "", -1e6, 1e6);
 /// Squares of a chessboard.
 pub const SQUARE_MM: Quantity =
-    mistaken(new("squares of a chessboard", "millimetres", 0.05, 2_000.0), FOR_MM);
+    mistaken(&new("squares of a chessboard", "millimetres", 0.05, 2_000.0), FOR_MM);
 /// How thick a swatch or sheet is, or how far it is raised.
 pub const THICKNESS_MM: Quantity =
-    mistaken(new("thicknesses", "millimetres", 0.0, 100.0), &[("micrometres", 1e-3)]);
+    mistaken(&new("thicknesses", "millimetres", 0.0, 100.0), &[("micrometres", 1e-3)]);
 
 /// Exposure times: of a flash, of a day.
 pub const EXPOSURE_S: Quantity =
-    mistaken(new("exposures", "seconds", 1e-6, 86_400.0), &[("milliseconds", 1e-3)]);
+    mistaken(&new("exposures", "seconds", 1e-6, 86_400.0), &[("milliseconds", 1e-3)]);
 /// Sensitivities.
 pub const ISO: Quantity = new("sensitivities", "ISO", 1.0, 10_000_000.0);
 /// Reflectances relative to a perfect white diffuser; fluorescent paper sends back a little more than it gets.
 pub const REFLECTANCE: Quantity =
-    mistaken(new("reflectances", "(1 is perfect white)", 1e-4, 1.5), &[("per cent", 1e-2)]);
+    mistaken(&new("reflectances", "(1 is perfect white)", 1e-4, 1.5), &[("per cent", 1e-2)]);
 /// Errors of angles that can be asked for.
 pub const ANGLE_DEG: Quantity = new("angles", "degrees", 0.0, 180.0);
 /// CIE lightness.

@@ -51,7 +51,7 @@ pub(super) fn leave_out_dark_lights(scene: &mut Scene) -> Result<Vec<String>, So
             what: "the frames of all lights show the same brightness everywhere, so no light changes the picture".into(),
         });
     }
-    let mut warnings = dead_channels(scene, &lit, &dark);
+    let mut warnings = dead_channels(scene, &bright, &lit, &dark);
     warnings.extend(sentence_of_dark(scene, &dark));
     let mut position = 0;
     scene.lights.retain(|_| {
@@ -92,13 +92,19 @@ fn sentence_of_dark(scene: &Scene, dark: &[usize]) -> Option<String> {
     }
 }
 
+/// A channel that adds less than this share of the brightest one's light is dead: no dye swallows so much.
+const DEAD_SHARE: f64 = 0.005;
+
 /// A channel in which a light shows nothing, although it does in others.
-fn dead_channels(scene: &Scene, lit: &[[f64; 3]], dark: &[usize]) -> Vec<String> {
+fn dead_channels(scene: &Scene, bright: &Bright, lit: &[[f64; 3]], dark: &[usize]) -> Vec<String> {
     let mut warnings = vec![];
     for (channel, color) in CHANNELS.iter().enumerate() {
         let of = |light: &usize| lit[*light][channel];
         let lights: Vec<usize> = (0..lit.len()).filter(|light| !dark.contains(light)).collect();
-        let dead: Vec<usize> = lights.iter().copied().filter(|light| of(light) == 0.0).collect();
+        // The noise is the whole frame's: a colour that the cloth hardly reflects may stay below it and still be there.
+        let is_dead =
+            |light: &usize| of(light) == 0.0 && bright.share(*light, channel) < DEAD_SHARE;
+        let dead: Vec<usize> = lights.iter().copied().filter(is_dead).collect();
         // A layout without the channel has no share of it at all.
         if dead.is_empty() || lights.iter().any(|light| of(light).is_nan()) {
             continue;
@@ -161,6 +167,21 @@ impl Bright {
             }
             lit / all
         })
+    }
+
+    /// What a light adds in one channel, as a share of what it adds in its brightest one.
+    fn share(&self, light: usize, channel: usize) -> f64 {
+        let added = |channel: usize| -> f64 {
+            let of_block = |block: usize| {
+                let frame = self.lights[light].first()?;
+                let level = frame.levels[block][channel];
+                let added = level - self.ambient_rate(block, channel) * frame.seconds;
+                added.is_finite().then_some(added)
+            };
+            (0..self.blocks()).filter_map(of_block).sum()
+        };
+        let most = (0..3).map(added).fold(f64::MIN_POSITIVE, f64::max);
+        added(channel) / most
     }
 
     /// The share of the blocks at which every frame of a light is clearly darker than the ambient light alone.

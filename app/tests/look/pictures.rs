@@ -76,7 +76,7 @@ fn slopes_with_a_line_through_them() {
 fn a_mask_being_painted() {
     check("mask", Bench::look, |window| {
         choose(window, "Map", "Expected error");
-        window.get_by_label("Brush").click();
+        window.get_by_role_and_label(egui::accesskit::Role::Button, "Brush").click();
         window.run();
         window.get_by_label("Leave out").click();
         window.run();

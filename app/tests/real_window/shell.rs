@@ -70,6 +70,8 @@ fn a_maximised_window_is_so_again_and_keeps_its_other_size() {
     }
     let mut desktop = desktop_or_return!();
     let mut manager = desktop.program("openbox").stderr(Stdio::null()).spawn().unwrap();
+    // It reads what a window asks for when that appears, so it must be there before.
+    std::thread::sleep(Duration::from_secs(3));
     let text = "schema = 1\nmaximized = true\nwindow_size = [900.0, 600.0]\n";
     let file = desktop.settings(text);
     for _ in 0..2 {

@@ -185,9 +185,12 @@ impl Look {
             }
             return self.drafts.forget(&folder, key);
         }
-        if let Some(painting) = self.painting.as_mut().filter(|of| of.version == version) {
-            painting.changed = false;
-            self.drafts.forget(&folder, key);
+        match &mut self.painting {
+            Some(painting) if painting.version != version => {}
+            painting => {
+                painting.iter_mut().for_each(|painting| painting.changed = false);
+                self.drafts.forget(&folder, key);
+            }
         }
     }
 }

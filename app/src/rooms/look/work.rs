@@ -50,10 +50,11 @@ fn open(path: &Path, tools: &mut Tools, out: &Outbox) {
             None => out.tell(Update::Look(Told::Unsolved(scan))),
         },
         What::Rig(folder) => {
-            out.tell(Update::GoTo(Room::Scans));
             if !is_open(&folder, tools.place.as_ref()) {
                 crate::worker::open::open(&folder, tools, out);
             }
+            // The room follows when the rig is there: opening it keeps the room as it is.
+            out.tell(Update::GoTo(Room::Scans));
         }
         What::Target(folder) => out.fail(texts::OPENING_FOLDER, &texts::is_target(&folder)),
         What::Calibration(folder, _) => {

@@ -17,7 +17,7 @@ use eframe::egui::{
     self, ColorImage, Key, Modifiers, RichText, Sense, TextureHandle, TextureOptions, vec2,
 };
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use weavelight::solve::Reuse;
 
 /// What this room asks of the worker.
@@ -323,7 +323,7 @@ impl Scans {
         });
         if let Some(solution) = &entry.solution {
             ui.separator();
-            self.export(ui, solution.clone(), entry, desk);
+            self.export(ui, solution, entry, desk);
         }
     }
 
@@ -347,7 +347,7 @@ impl Scans {
         }
     }
 
-    fn export(&mut self, ui: &mut egui::Ui, solution: PathBuf, entry: &Entry, desk: &mut Desk) {
+    fn export(&mut self, ui: &mut egui::Ui, solution: &Path, entry: &Entry, desk: &mut Desk) {
         if self.export_to.is_empty() {
             self.export_to = export_folder(entry, desk).display().to_string();
         }
@@ -359,11 +359,11 @@ impl Scans {
                 self.export_to = folder.join(export_name(entry)).display().to_string();
             }
             if ui.add_enabled(!desk.is_busy(), egui::Button::new(texts::EXPORT)).clicked() {
-                let (solution, to) = (solution.clone(), PathBuf::from(self.export_to.trim()));
+                let (solution, to) = (solution.to_owned(), PathBuf::from(self.export_to.trim()));
                 desk.ask(Command::Scans(Ask::Export { solution, to }));
             }
         });
-        if let Some((_, said)) = self.said.as_ref().filter(|(of, _)| *of == solution) {
+        if let Some((_, said)) = self.said.as_ref().filter(|(of, _)| of == solution) {
             ui.add(egui::Label::new(said).wrap());
         }
     }
