@@ -117,8 +117,8 @@ fn stops(window: &mut Window, theme: egui::Theme) -> Vec<Rect> {
     let mut stops: Vec<Rect> = Vec::new();
     for _ in 0..80 {
         window.harness.key_press(Key::Tab);
-        window.harness.step();
-        window.harness.step();
+        // What is out of sight scrolls in, which takes a few frames.
+        (0..8).for_each(|_| window.harness.step());
         let id = window.harness.ctx.memory(|memory| memory.focused());
         let Some(rect) = id.and_then(|id| window.harness.ctx.read_response(id)).map(|r| r.rect)
         else {

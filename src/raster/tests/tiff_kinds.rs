@@ -189,7 +189,7 @@ fn damage_is_called_damage() {
     let mut short = page.clone();
     short.segments[0].truncate(30);
     check(&PLAIN.file(&[short]), "a strip has 30 of 32 bytes");
-    let beyond = Kind::file(PLAIN, &[page.clone()]);
+    let beyond = Kind::file(PLAIN, std::slice::from_ref(&page));
     let mut beyond = beyond;
     let at = beyond.windows(4).position(|four| four == [0x11, 1, 4, 0]).unwrap();
     beyond[at + 8..at + 12].copy_from_slice(&500_000_u32.to_le_bytes());

@@ -186,7 +186,10 @@ fn what_is_not_read_has_its_name() {
             let error = decode(bytes, &Hint { cfa: None, encoding }).unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}, not {expected}");
             assert!(error.contains("cannot be read; ") && error.lines().count() == 1, "{error}");
-            assert!(error.matches('"').count() % 2 == 0 && !error.contains("RawLoader"), "{error}");
+            assert!(
+                error.matches('"').count().is_multiple_of(2) && !error.contains("RawLoader"),
+                "{error}"
+            );
         }
     };
     let padded = |head: &[u8]| [head, &[0x5a; 3000]].concat();

@@ -15,7 +15,7 @@ fn under_light(light: usize, take: usize) -> Vec<u8> {
     let black = 600;
     let photosite = |k: usize| {
         let (x, y) = (k % SIDE, k / SIDE);
-        let lean = if light % 2 == 0 { x } else { y };
+        let lean = if light.is_multiple_of(2) { x } else { y };
         let noise = (k * (2 * take + 7)) % 5;
         (black + 1500 + 40 * (light + 1) * lean + noise) as u16
     };
@@ -178,8 +178,11 @@ impl Shutter for Lit {
     }
 }
 
-/// Takes one picture per light, of which the other program writes `steps`; the bytes taken or the error, and what was said.
-fn scan(lights: Vec<(u32, Vec<Step>)>) -> Vec<(Result<Vec<u8>, String>, Vec<String>)> {
+/// The bytes taken or the error, and what was said meanwhile.
+type Outcome = (Result<Vec<u8>, String>, Vec<String>);
+
+/// Takes one picture per light, of which the other program writes `steps`.
+fn scan(lights: Vec<(u32, Vec<Step>)>) -> Vec<Outcome> {
     let (watched, target) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut camera = WatchedCamera::new(watched.path(), None, WAITING);
     let mut one = |(lit, steps)| {

@@ -4,7 +4,10 @@ fn numbered(text: &str) -> Vec<Numbered> {
     text.lines().enumerate().map(|(k, line)| (k + 1, line.trim().to_owned())).collect()
 }
 
-fn parsed(text: &str) -> Result<Vec<(Vec<String>, Vec<f64>)>, String> {
+/// Names and numbers of a line.
+type Parsed = (Vec<String>, Vec<f64>);
+
+fn parsed(text: &str) -> Result<Vec<Parsed>, String> {
     let table =
         read(Path::new("l"), &numbered(text), 3, None).map_err(|error| error.to_string())?;
     Ok(table.rows.into_iter().map(|row| (row.names, row.values)).collect())
