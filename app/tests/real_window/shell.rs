@@ -21,13 +21,11 @@ macro_rules! desktop_or_return {
     };
 }
 
-fn is_installed(name: &str) -> bool {
+/// Sees that a program is there: `make test` installs it.
+fn need(name: &str) {
     let mut asked = Command::new(name);
     let found = asked.arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
-    if !found {
-        println!("not run: {name} is missing");
-    }
-    found
+    assert!(found, "{name} is missing; `make test` installs it");
 }
 
 /// A value in the settings, as the file has it.
@@ -65,9 +63,7 @@ fn the_first_window_leaves_room_on_its_screen() {
 
 #[test]
 fn a_maximised_window_is_so_again_and_keeps_its_other_size() {
-    if !is_installed("openbox") {
-        return;
-    }
+    need("openbox");
     let mut desktop = desktop_or_return!();
     let mut manager = desktop.program("openbox").stderr(Stdio::null()).spawn().unwrap();
     // It reads what a window asks for when that appears, so it must be there before.
@@ -89,9 +85,7 @@ fn a_maximised_window_is_so_again_and_keeps_its_other_size() {
 
 #[test]
 fn texts_go_to_other_programs_and_come_from_them() {
-    if !is_installed("xclip") {
-        return;
-    }
+    need("xclip");
     let mut desktop = desktop_or_return!();
     let (_, file) = desktop.rig(super::FRAME);
     desktop.open();
