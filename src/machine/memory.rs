@@ -3,8 +3,10 @@
 use crate::files::{read_input_text, size};
 use std::path::{Path, PathBuf};
 
-/// Memory that a run needs beside what is foreseen: the program, its threads, buffers.
+/// Memory that any run needs beside what is foreseen: buffers of bands and rows, files being encoded.
 const BESIDE_BYTES: u64 = 64 << 20;
+/// Address space that the allocator sets aside and uses only in part.
+const SET_ASIDE_BYTES: u64 = 64 << 20;
 
 /// Something that needs more memory than there is.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,7 +54,8 @@ fn of_address_space() -> Option<(u64, &'static str)> {
     let statm = read_input_text(Path::new("/proc/self/statm")).ok()?;
     let pages: u64 = statm.split(' ').next()?.parse().ok()?;
     let used = pages.saturating_mul(rustix::param::page_size() as u64);
-    Some((limit.saturating_sub(used), "the address space is limited, see ulimit -v"))
+    let left = limit.saturating_sub(used).saturating_sub(SET_ASIDE_BYTES);
+    Some((left, "the address space is limited, see ulimit -v"))
 }
 
 #[cfg(not(unix))]
@@ -114,10 +117,10 @@ fn of_machine() -> Option<(u64, &'static str)> {
 /// Address space of a thread: its stack, and what the allocator sets aside for each.
 const BYTES_PER_THREAD: u64 = 192 << 20;
 
-/// How many threads fit into the address space, where that is limited; at least one.
-pub(super) fn threads_that_fit() -> usize {
-    let left = of_address_space().map_or(u64::MAX, |(left, _)| left);
-    usize::try_from(left / BYTES_PER_THREAD).unwrap_or(usize::MAX).max(1)
+/// How many threads fit into the address space; at least one. `None` where it is not limited.
+pub(super) fn threads_that_fit() -> Option<usize> {
+    let (left, _) = of_address_space()?;
+    Some(usize::try_from(left / BYTES_PER_THREAD).unwrap_or(usize::MAX).max(1))
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ pub fn thread_count(asked: Option<usize>) -> usize {
 /// threads, it has fewer; where it gives none, the calling thread does all the work.
 pub fn start() {
     let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
-    let wanted = thread_count(asked).min(threads_that_fit());
+    let wanted = thread_count(asked).min(threads_that_fit().unwrap_or(usize::MAX));
     let count = match to_be_had(wanted + SPARE) {
         0 | 1 => 0,
         all if all == wanted + SPARE => wanted,
@@ -49,10 +49,12 @@ pub struct Pool(Option<ThreadPool>);
 impl Pool {
     /// With as many threads as are `asked` for, make sense and are to be had.
     pub fn new(asked: Option<usize>) -> Self {
-        let mut count = match asked {
+        let mut count = match (asked, threads_that_fit()) {
+            // Threads beside those that are there would take the address space from the work.
+            (_, Some(few)) if few < 2 * rayon::current_num_threads() => 0,
             // The common pool has the right number, and perhaps fewer because there were no more.
-            None => rayon::current_num_threads(),
-            Some(count) => thread_count(Some(count)),
+            (None, _) => rayon::current_num_threads(),
+            (Some(count), _) => thread_count(Some(count)),
         };
         while count > 0 {
             if let Ok(pool) = builder(count).build() {
