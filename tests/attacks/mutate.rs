@@ -202,7 +202,7 @@ fn mutated_text(text: &str, numbers: &mut Numbers) -> String {
     for _ in 0..=numbers.below(2) {
         let at = numbers.below(lines.len());
         match numbers.below(7) {
-            0 | 1 | 2 => lines[at] = with_another_number(&lines[at], numbers),
+            0..=2 => lines[at] = with_another_number(&lines[at], numbers),
             3 => drop(lines.remove(at)),
             4 => lines.insert(at, lines[at].clone()),
             5 => lines[at].push_str(STRANGE[numbers.below(STRANGE.len())]),

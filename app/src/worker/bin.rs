@@ -135,6 +135,7 @@ fn restore(_items: Vec<trash::TrashItem>) -> Result<(), trash::Error> {
 }
 
 #[cfg(all(test, not(target_os = "macos")))]
+#[allow(clippy::unwrap_used, reason = "a test that cannot set its scene up has failed")]
 mod tests {
     use super::*;
     use std::path::Path;
