@@ -35,7 +35,7 @@ fn cloths() -> Vec<Frame> {
         let (x, y) = at(k);
         let over = (x / 8 + y / 8) % 2 == 0;
         let along = if over { x } else { y } % 8;
-        0.2 + 0.5 * (along as f32 / 8.0 * 3.14).sin()
+        0.2 + 0.5 * (along as f32 / 8.0 * std::f32::consts::PI).sin()
     });
     let noise = grey(width, height, |_| dice());
     let twill = grey(width, height, |k| {
