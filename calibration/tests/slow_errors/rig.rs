@@ -131,7 +131,7 @@ impl Rig {
         };
         // Half of the benches have LEDs of one kind, half a mixture.
         let usual = dice.between(0.8, 3.0);
-        let one_kind = seed % 2 == 0;
+        let one_kind = seed.is_multiple_of(2);
         let led = |[azimuth, elevation, distance]: [f64; 3]| {
             let (sa, ca) = f64::to_radians(azimuth).sin_cos();
             let (se, ce) = f64::to_radians(elevation).sin_cos();
