@@ -43,7 +43,7 @@ pub struct Options {
     pub b: PathBuf,
     /// What is inside it is compared; see [`crate::raster::decode_mask`].
     pub mask: Option<PathBuf>,
-    /// What the maps hold; guessed where absent, see [`guess_kind`].
+    /// What the maps hold; guessed from their names and content where absent.
     pub kind: Option<Kind>,
 }
 
