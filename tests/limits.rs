@@ -176,7 +176,6 @@ fn a_small_stack_is_enough() {
 }
 
 #[test]
-#[ignore = "fails: with every feature built in, a solve is refused up to 600 MB of address space; to be mended"]
 fn little_memory_is_enough_or_refused() {
     let home = Home::new();
     let folder = home.path("");

@@ -255,3 +255,30 @@ fn error_numbers_agree_in_protocol_firmware_and_host() {
     );
     assert_eq!(firmware.matches("    ERROR_").count(), REFUSALS.len() + 1, "protocol.h");
 }
+
+/// docs/attacks.md names tests and places; what it names must be there.
+#[test]
+fn the_table_of_attacks_names_what_is_there() {
+    let text = fs::read_to_string(root().join("docs/attacks.md")).unwrap();
+    let code: String = ["src", "tests", "app", "calibration", "sim", "tether"]
+        .iter()
+        .flat_map(|folder| files_below(folder, "rs"))
+        .map(|file| fs::read_to_string(file).unwrap())
+        .collect();
+    let rows =
+        text.lines().filter(|line| line.starts_with("| ") && line.matches(" | ").count() == 3);
+    let mut count = 0;
+    for row in rows.filter(|row| row.contains('`')) {
+        let [.., places, tests] = row.split(" | ").collect::<Vec<_>>()[..] else { continue };
+        for name in tests.split('`').skip(1).step_by(2) {
+            assert!(code.contains(&format!("fn {name}(")), "no test {name}: {row}");
+        }
+        for place in places.split('`').skip(1).step_by(2).filter(|place| !place.contains('{')) {
+            let parts = place.split('/').count();
+            let there = parts == 1 || root().join(place).exists();
+            assert!(there, "no {place}: {row}");
+        }
+        count += 1;
+    }
+    assert!(count > 60, "{count} rows");
+}

@@ -1,7 +1,7 @@
 //! A tile as the bytes that the shader reads.
 
 use super::tile::{FOUND_PLANES, Tile, TileRow};
-use crate::photometry::{VarianceModel, chi_square_limit};
+use crate::photometry::{MAX_LIGHTS, VarianceModel, chi_square_limit};
 use bytemuck::{Pod, Zeroable};
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use std::ops::Range;
 const COEFFICIENTS_OF_INVERSE: usize = 12;
 const COEFFICIENTS_OF_LIGHT: usize = 6;
 const PLACES: usize = 4;
-const NOISE_ENTRIES: usize = 256;
+const NOISE_ENTRIES: usize = PLACES * MAX_LIGHTS;
 /// In place of infinity, which a shader may not know.
 const HUGE: f32 = 3e38;
 /// No binding may be empty, or less than an entry.

@@ -38,8 +38,8 @@ struct Inverse {
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
-// Per light: shot, floor, kappa at the four places of the 2 x 2 cell. var(y) = shot y + floor + (kappa y)^2.
-@group(0) @binding(1) var<uniform> noise: array<vec4<f32>, 256>;
+// Per light (256 of them: the least that a uniform buffer holds everywhere): shot, floor, kappa at the four places of the 2 x 2 cell. var(y) = shot y + floor + (kappa y)^2.
+@group(0) @binding(1) var<uniform> noise: array<vec4<f32>, 1024>;
 // Row by row, plane by plane; bits, because a number that is not one means that there is no sample.
 @group(0) @binding(2) var<storage, read> samples: array<u32>;
 @group(0) @binding(3) var<storage, read> pieces: array<Piece>;

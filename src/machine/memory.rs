@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 /// Memory that any run needs beside what is foreseen: buffers of bands and rows, files being encoded.
 const BESIDE_BYTES: u64 = 64 << 20;
-/// Address space that the allocator sets aside and uses only in part.
-const SET_ASIDE_BYTES: u64 = 64 << 20;
+/// Address space that the allocator sets aside and uses only in part, with one arena ([`super::correct_environment`]).
+const SET_ASIDE_BYTES: u64 = 16 << 20;
 
 /// Something that needs more memory than there is.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -114,8 +114,8 @@ fn of_machine() -> Option<(u64, &'static str)> {
     Some((free.saturating_mul(1024), "all that is free on this machine"))
 }
 
-/// Address space of a thread: its stack, and what the allocator sets aside for each.
-const BYTES_PER_THREAD: u64 = 192 << 20;
+/// Address space of a thread: its stack, and what it works on.
+const BYTES_PER_THREAD: u64 = 64 << 20;
 
 /// How many threads fit into the address space; at least one. `None` where it is not limited.
 pub(super) fn threads_that_fit() -> Option<usize> {

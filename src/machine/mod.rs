@@ -1,8 +1,10 @@
 //! What the machine has to give: threads and memory. Asked before the work, so that a machine or a limit too small for it ends
 //! in a sentence, not in the middle of a picture.
 
+mod environment;
 mod memory;
 mod threads;
 
+pub use environment::correct_environment;
 pub use memory::{NoMemory, available_bytes, check_memory};
 pub use threads::{Pool, spawn, start, thread_count};

@@ -28,11 +28,15 @@ pub fn thread_count(asked: Option<usize>) -> usize {
 /// threads, it has fewer; where it gives none, the calling thread does all the work.
 pub fn start() {
     let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse().ok());
-    let wanted = thread_count(asked).min(threads_that_fit().unwrap_or(usize::MAX));
-    let count = match to_be_had(wanted + SPARE) {
+    let fit = threads_that_fit();
+    let wanted = thread_count(asked).min(fit.unwrap_or(usize::MAX));
+    // What the allocator sets aside for a thread it keeps when the thread ends: where address space is scarce, trying out
+    // more threads than will work would use it up.
+    let spare = if fit.is_some() { 0 } else { SPARE };
+    let count = match to_be_had(wanted + spare) {
+        all if all == wanted + spare && all > 1 => wanted,
         0 | 1 => 0,
-        all if all == wanted + SPARE => wanted,
-        few => few.saturating_sub(SPARE).max(1),
+        few => few.saturating_sub(spare).max(1),
     };
     // A pool that is there already (in a test) will do.
     let _ = match count {

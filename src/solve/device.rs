@@ -51,9 +51,6 @@ impl Chosen {
     }
 }
 
-/// Beyond, the shaders' expected errors do not agree with the processor's.
-pub(super) const GPU_MOST_LIGHTS: usize = 64;
-
 /// Decides on the current thread pool.
 ///
 /// # Errors
@@ -61,11 +58,6 @@ pub(super) const GPU_MOST_LIGHTS: usize = 64;
 pub(crate) fn choose(run: &Run, device: &Device) -> Result<Chosen, SolveError> {
     if run.method() == Method::Robust {
         return Ok(Chosen::processor("the subset test of every photosite is the processor's"));
-    }
-    if run.lights() > GPU_MOST_LIGHTS {
-        return Ok(Chosen::processor(format!(
-            "more than {GPU_MOST_LIGHTS} lights are the processor's"
-        )));
     }
     let asked = "asked for";
     Ok(match device {
