@@ -110,60 +110,157 @@ fn graphics_processors_stay_in_one_room() {
     expect_none("only src/gpu speaks to graphics processors", &found);
 }
 
-#[test]
-fn rooms_use_only_the_rooms_below_them() {
-    let check = |room: &str, forbidden: &[&str]| {
-        let words: Vec<String> = forbidden.iter().map(|above| format!("crate::{above}")).collect();
-        let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        expect_none(
-            &format!("src/{room} reaches upward"),
-            &mentions(&format!("src/{room}"), &words),
-        );
-    };
-    let top = ["cli", "report", "calibrate", "solve", "simulate", "solution", "photometry"];
-    check("files", &[&top[..], &["raster", "raw", "session", "instrument"]].concat());
-    check(
-        "photometry",
+/// Every room of `src` from the ground up, and the rooms that it may use: rooms before it, and no others. A room that is not
+/// here fails.
+const ROOMS: &[(&str, &[&str])] = &[
+    ("quantity", &[]),
+    ("files", &["quantity"]),
+    ("machine", &["files"]),
+    ("raster", &["files", "machine"]),
+    ("raw", &["files", "raster"]),
+    ("instrument", &["files", "quantity", "raster", "raw"]),
+    ("session", &["files", "instrument", "quantity", "raster", "raw"]),
+    ("solution", &["files", "instrument", "quantity"]),
+    ("photometry", &[]),
+    ("gpu", &["photometry"]),
+    ("simulate", &["files", "instrument", "machine", "quantity", "raster", "session"]),
+    (
+        "solve",
         &[
             "files",
+            "gpu",
+            "instrument",
+            "machine",
+            "photometry",
             "raster",
             "raw",
             "session",
+            "solution",
+        ],
+    ),
+    ("compare", &["files", "raster"]),
+    ("calibrate", &["files", "instrument", "raw", "session"]),
+    // The simulated camera photographs with the simulated rig's instrument.
+    ("device", &["files", "instrument", "machine", "raster", "raw", "session", "simulate"]),
+    ("doctor", &["device", "files", "gpu"]),
+    ("report", &["compare", "raster", "solution", "solve"]),
+    ("demo", &["compare", "report", "simulate", "solution", "solve"]),
+    ("bench", &["compare", "files", "gpu", "photometry", "raw", "simulate", "solution", "solve"]),
+    (
+        "cli",
+        &[
+            "bench",
+            "calibrate",
+            "compare",
+            "demo",
+            "device",
+            "doctor",
+            "files",
             "instrument",
+            "machine",
+            "photometry",
+            "quantity",
+            "report",
+            "session",
+            "simulate",
             "solution",
             "solve",
-            "cli",
-            "report",
-            "gpu",
         ],
-    );
-    let below_gpu = ["files", "raster", "raw", "session", "instrument"];
-    check("gpu", &[&below_gpu[..], &["cli", "report", "calibrate", "solve", "solution"]].concat());
-    check("raster", &[&top[..], &["session", "instrument"]].concat());
-    check("raw", &[&top[..], &["session", "instrument"]].concat());
-    check("session", &top);
-    check("instrument", &top);
-    check("compare", &[&top[..], &["raw", "session", "instrument", "demo", "device"]].concat());
-    check(
-        "doctor",
-        &[&top[..], &["raster", "raw", "session", "instrument", "compare", "demo"]].concat(),
-    );
-    check("solution", &["cli", "report", "calibrate", "solve", "simulate", "photometry"]);
-    check("solve", &["cli", "report", "calibrate", "simulate"]);
-    check("simulate", &["cli", "report", "calibrate", "solve", "photometry", "device"]);
-    check("calibrate", &["cli", "simulate"]);
-    check("report", &["cli", "simulate"]);
-    // The simulated camera photographs with the simulated rig's instrument.
-    check("device", &["cli", "report", "calibrate", "solution", "photometry"]);
-    check("bench", &["cli", "report", "calibrate", "device", "demo"]);
-    // Measuring is for the command line alone.
-    for file in files_below("src", "rs") {
-        let path = file.strip_prefix(root()).unwrap().to_owned();
-        if !path.starts_with("src/bench") && !path.starts_with("src/cli") {
-            let text = fs::read_to_string(&file).unwrap();
-            assert!(!text.contains("crate::bench"), "{} uses crate::bench", path.display());
+    ),
+];
+
+/// Code without comments and without what is compiled for tests only.
+fn product(text: &str) -> String {
+    let mut code = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim_start().starts_with("#[cfg(test)]")
+            || line.trim_start().starts_with("#[cfg(all(test")
+        {
+            match lines.next() {
+                // A file of its own, which is passed over by its name.
+                Some(module) if module.trim_end().ends_with(';') => continue,
+                _ => break,
+            }
+        }
+        code.push_str(line.split("//").next().unwrap());
+        code.push('\n');
+    }
+    code
+}
+
+fn is_of_tests(path: &Path) -> bool {
+    let stem = path.file_stem().unwrap().to_string_lossy();
+    path.components().any(|part| part.as_os_str() == "tests")
+        || stem.ends_with("tests")
+        || stem == "round_trip"
+}
+
+/// The first names after `crate::`, braces and all.
+fn names_below_crate(code: &str) -> BTreeSet<String> {
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    let first =
+        |text: &str| text.trim_start().chars().take_while(|c| is_name(*c)).collect::<String>();
+    let mut found = BTreeSet::new();
+    for rest in code.split("crate::").skip(1) {
+        let Some(list) = rest.strip_prefix('{') else {
+            found.insert(first(rest));
+            continue;
+        };
+        let (mut depth, mut begin) = (1, 0);
+        for (at, c) in list.char_indices() {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            if depth == 0 || (depth == 1 && c == ',') {
+                found.insert(first(&list[begin..at]));
+                begin = at + 1;
+            }
+            if depth == 0 {
+                break;
+            }
         }
     }
+    found
+}
+
+#[test]
+fn rooms_use_only_the_rooms_that_they_may() {
+    let position = |room: &str| ROOMS.iter().position(|(name, _)| *name == room);
+    let mut found = Vec::new();
+    for (at, (room, allowed)) in ROOMS.iter().enumerate() {
+        assert!(root().join("src").join(room).is_dir(), "no room {room}");
+        for other in *allowed {
+            assert!(
+                position(other).is_some_and(|below| below < at),
+                "{room} stands before {other}"
+            );
+        }
+    }
+    for file in files_below("src", "rs") {
+        let path = file.strip_prefix(root().join("src")).unwrap();
+        if is_of_tests(path) || path.components().count() < 2 {
+            continue;
+        }
+        let room = path.components().next().unwrap().as_os_str().to_string_lossy();
+        let Some(at) = position(&room) else { panic!("src/{room} is not in the table of rooms") };
+        for name in names_below_crate(&product(&fs::read_to_string(&file).unwrap())) {
+            let known = position(&name).is_some() && name != room;
+            if known && !ROOMS[at].1.contains(&name.as_str()) {
+                found.push(format!("{} uses {name}", path.display()));
+            }
+        }
+    }
+    expect_none("rooms that use others than their row allows", &found);
+}
+
+#[test]
+fn names_are_read_through_braces() {
+    let code = "use crate::files::{self, x};\nuse crate::{raw::{self, a}, solve, machine::spawn};\nlet _ = crate::gpu::open();";
+    let names: Vec<String> = names_below_crate(code).into_iter().collect();
+    assert_eq!(names, ["files", "gpu", "machine", "raw", "solve"]);
+    assert_eq!(
+        product("a // b\n#[cfg(test)]\nmod tests;\nc\n#[cfg(test)]\nmod tests {\nd"),
+        "a \nc\n"
+    );
 }
 
 /// A named pipe makes a plain read wait for ever, `/dev/zero` makes it fill the memory.

@@ -2,7 +2,7 @@
 
 use crate::files::{harmless, harmless_json, one_line};
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{self, Write};
 use std::process::ExitCode;
 
 /// Characters of one message: names of files and what is in them may be any length.
@@ -52,12 +52,14 @@ pub(super) fn finish(result: Result<Output, Failure>, json: bool) -> ExitCode {
             for warning in &output.warnings {
                 to_stderr(&format!("warning: {}", one_line(warning, LONGEST)));
             }
-            if json {
-                to_stdout(&harmless_json(&output.json.to_string()));
+            let printed = if json {
+                to_stdout(&harmless_json(&output.json.to_string()))
             } else {
-                to_stdout(&harmless(&output.text));
-            }
-            ExitCode::from(output.status)
+                to_stdout(&harmless(&output.text))
+            };
+            let Err(error) = printed else { return ExitCode::from(output.status) };
+            to_stderr(&format!("error: the work is done, but its result was not printed: {error}"));
+            ExitCode::from(WORK_FAILED)
         }
         Err(failure) => {
             to_stderr(&format!("error: {}", one_line(&failure.message, LONGEST)));
@@ -71,8 +73,8 @@ pub(super) fn refuse(error: &clap::Error) -> ExitCode {
     use clap::error::ErrorKind;
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            to_stdout(&error.render().to_string());
-            ExitCode::SUCCESS
+            let printed = to_stdout(&error.render().to_string());
+            ExitCode::from(if printed.is_ok() { 0 } else { WORK_FAILED })
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             to_stderr(&error.render().to_string());
@@ -97,14 +99,19 @@ fn in_two_lines(message: &str) -> String {
     format!("{}\n{usage}; see --help", one_line(&paragraph.join(" "), LONGEST))
 }
 
-/// A reader that stopped listening (`weavelight ... | head`) is no failure of the work, so errors are let go.
-fn to_stdout(text: &str) {
+/// A reader that stopped listening (`weavelight ... | head`) is no failure.
+fn to_stdout(text: &str) -> io::Result<()> {
     let text = text.trim_end();
-    if !text.is_empty() {
-        let _ = writeln!(std::io::stdout().lock(), "{text}");
+    if text.is_empty() {
+        return Ok(());
+    }
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
     }
 }
 
 fn to_stderr(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{}", text.trim_end());
+    let _ = writeln!(io::stderr().lock(), "{}", text.trim_end());
 }

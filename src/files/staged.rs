@@ -192,7 +192,7 @@ fn check_free(
     if !survey.is_listed {
         let first = survey.any_name().unwrap_or_default();
         let what = format!(
-            "holds {first} and no {LIST_FILE} that says it is weavelight's; only an earlier {} and nothing else would be replaced",
+            "holds {first}, and no {LIST_FILE} says that weavelight wrote it; only an earlier {} and nothing else would be replaced",
             kind.name
         );
         return Err(occupied(target, what));
@@ -201,8 +201,11 @@ fn check_free(
         return Err(holds(target, &what, kind));
     }
     if !survey.has(marker) {
-        let first = survey.any_name().unwrap_or_default();
-        return Err(holds(target, &first, kind));
+        let rule = format!("only an earlier {} and nothing else would be replaced", kind.name);
+        return Err(occupied(
+            target,
+            format!("is not a {} (no {marker} in it); {rule}", kind.name),
+        ));
     }
     Ok(Some(survey))
 }

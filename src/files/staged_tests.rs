@@ -75,11 +75,11 @@ fn what_is_not_ours_is_named_and_stays() {
     check_refused(|out| fs::create_dir(out.join("empty")).unwrap(), "holds empty, which");
     check_refused(
         |out| fs::remove_file(out.join(LIST_FILE)).unwrap(),
-        "no .weavelight-files that says it is weavelight's",
+        "no .weavelight-files says that weavelight wrote it",
     );
     check_refused(
         |out| fs::remove_file(out.join("report.json")).unwrap(),
-        "holds .weavelight-files; only",
+        "is not a solution (no report.json in it); only",
     );
     check_refused(
         |out| {

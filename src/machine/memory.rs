@@ -43,23 +43,43 @@ pub fn check_memory(
 
 /// Bytes that this process may still take, and what limits them; `None` where the system does not say.
 pub fn available_bytes() -> Option<(u64, &'static str)> {
-    [of_address_space(), of_cgroup(), of_machine()].into_iter().flatten().min_by_key(|left| left.0)
+    [of_address_space(), of_data(), of_cgroup(), of_machine()]
+        .into_iter()
+        .flatten()
+        .min_by_key(|left| left.0)
 }
 
 #[cfg(unix)]
 fn of_address_space() -> Option<(u64, &'static str)> {
     use rustix::process::{Resource, getrlimit};
     let limit = getrlimit(Resource::As).current?;
-    // The first number of statm: pages of address space in use.
-    let statm = read_input_text(Path::new("/proc/self/statm")).ok()?;
-    let pages: u64 = statm.split(' ').next()?.parse().ok()?;
-    let used = pages.saturating_mul(rustix::param::page_size() as u64);
-    let left = limit.saturating_sub(used).saturating_sub(SET_ASIDE_BYTES);
+    let left = limit.saturating_sub(in_use(0)?).saturating_sub(SET_ASIDE_BYTES);
     Some((left, "the address space is limited, see ulimit -v"))
+}
+
+#[cfg(unix)]
+fn of_data() -> Option<(u64, &'static str)> {
+    use rustix::process::{Resource, getrlimit};
+    let limit = getrlimit(Resource::Data).current?;
+    let left = limit.saturating_sub(in_use(5)?).saturating_sub(SET_ASIDE_BYTES);
+    Some((left, "memory for data is limited, see ulimit -d"))
+}
+
+/// Bytes that number `place` of statm says: 0 address space, 5 data and stacks.
+#[cfg(unix)]
+fn in_use(place: usize) -> Option<u64> {
+    let statm = read_input_text(Path::new("/proc/self/statm")).ok()?;
+    let pages: u64 = statm.split(' ').nth(place)?.trim().parse().ok()?;
+    Some(pages.saturating_mul(rustix::param::page_size() as u64))
 }
 
 #[cfg(not(unix))]
 fn of_address_space() -> Option<(u64, &'static str)> {
+    None
+}
+
+#[cfg(not(unix))]
+fn of_data() -> Option<(u64, &'static str)> {
     None
 }
 
@@ -117,9 +137,10 @@ fn of_machine() -> Option<(u64, &'static str)> {
 /// Address space of a thread: its stack, and what it works on.
 const BYTES_PER_THREAD: u64 = 64 << 20;
 
-/// How many threads fit into the address space; at least one. `None` where it is not limited.
+/// How many threads fit into what is left; at least one. `None` where neither address space nor data are limited.
 pub(super) fn threads_that_fit() -> Option<usize> {
-    let (left, _) = of_address_space()?;
+    let (left, _) =
+        [of_address_space(), of_data()].into_iter().flatten().min_by_key(|left| left.0)?;
     Some(usize::try_from(left / BYTES_PER_THREAD).unwrap_or(usize::MAX).max(1))
 }
 
