@@ -69,7 +69,7 @@ fn a_calibration() {
     let found = Calibration::load(&home.path().join("calibration")).unwrap();
     assert_eq!(found.lights.len(), 3);
     assert!(found.camera.is_some());
-    assert!(found.color.is_some());
+    assert!(found.color.camera_to_linear_srgb.is_some());
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn a_program_without_it_says_how_to_get_it() {
     home.run("solve s --calibration c --out a --device gpu").expect_failure(
         "not built",
         1,
-        &["--features gpu"],
+        &["`gpu` feature"],
     );
     assert_eq!(home.run("solve s --calibration c --out a").status, Some(0));
     assert_eq!(device(&home, "a")["kind"], "cpu");

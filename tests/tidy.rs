@@ -379,3 +379,25 @@ fn the_table_of_attacks_names_what_is_there() {
     }
     assert!(count > 60, "{count} rows");
 }
+
+/// The window shows the library's messages too. What a user can set is a `files::Setting`, which every interface words itself.
+#[test]
+fn only_the_command_line_names_its_options() {
+    let mut found = Vec::new();
+    for folder in ["src", "calibration/src", "sim/src", "app/src"] {
+        for file in files_below(folder, "rs") {
+            let path = file.strip_prefix(root()).unwrap();
+            if path.starts_with("src/cli") || is_of_tests(path) {
+                continue;
+            }
+            let code = product(&fs::read_to_string(&file).unwrap());
+            for line in code.lines().filter(|line| line.contains("\"--") || line.contains(" --")) {
+                let names = |rest: &str| rest.starts_with(|c: char| c.is_ascii_lowercase());
+                if line.split("--").skip(1).any(names) {
+                    found.push(format!("{}: {}", path.display(), line.trim()));
+                }
+            }
+        }
+    }
+    expect_none("messages that name options of the command line", &found);
+}

@@ -4,6 +4,7 @@ use weavelight_app::{App, settings::Settings, texts};
 
 fn main() -> eframe::Result {
     weavelight::machine::correct_environment();
+    weavelight::files::name_settings(texts::setting);
     weavelight::machine::start();
     weavelight::files::survive_size_limits();
     let settings = Settings::load();

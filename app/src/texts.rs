@@ -549,3 +549,13 @@ pub mod scans {
 
 /// The Look room.
 pub mod look;
+
+/// What the window calls a setting that a message of the library names.
+pub fn setting(name: &str) -> String {
+    match name {
+        "out" => "place".to_owned(),
+        "resume" => format!("“{}”", scan::RESUME),
+        "force" => "“Solve again”".to_owned(),
+        name => weavelight::files::plain_words(name),
+    }
+}

@@ -59,7 +59,7 @@ pub enum CalibrateError {
     },
     /// A build without OpenCV.
     #[error(
-        "this build has no chessboard detection; build with `cargo build --features opencv` (needs libopencv-dev and clang)"
+        "this build has no chessboard detection; build it with its `opencv` feature (needs libopencv-dev and clang)"
     )]
     NoChessboards,
 }

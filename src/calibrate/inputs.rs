@@ -1,6 +1,7 @@
 //! What a command is given: capture sessions of one kind, each with pictures and each once.
 
 use super::CalibrateError;
+use crate::files::Setting;
 use crate::raw::{Frame, Samples};
 use crate::session::{FrameEntry, Kind, Session};
 use std::collections::HashMap;
@@ -46,7 +47,8 @@ pub(super) fn load(path: &Path, kind: Kind) -> Result<Session, CalibrateError> {
             Kind::Grey => "a chart",
             Kind::Swatch => "a fabric",
         };
-        let remedy = format!("photograph it with `weavelight scan --kind {}`", name_of(kind));
+        let remedy =
+            format!("photograph it with `weavelight scan`, {} {}", Setting("kind"), name_of(kind));
         return Err(CalibrateError::target(place, format!("no picture of {target}"), remedy));
     }
     session.check_files()?;
@@ -68,7 +70,7 @@ fn name_of(kind: Kind) -> &'static str {
 /// Where a file stands there.
 pub(super) fn check_out(out: &Path) -> Result<(), CalibrateError> {
     if out.exists() && !out.is_dir() {
-        let remedy = "give a calibration folder with --out";
+        let remedy = format!("give a calibration folder as {}", Setting("out"));
         return Err(CalibrateError::target(out, "is a file", remedy));
     }
     Ok(())

@@ -19,7 +19,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-use crate::machine;
+use crate::{files, machine};
 use clap::{Parser, Subcommand};
 use output::{Failure, Output};
 use std::process::ExitCode;
@@ -81,6 +81,7 @@ pub fn main() -> ExitCode {
 const PANICKED: u8 = 101;
 
 fn call() -> ExitCode {
+    files::name_settings(|name| format!("--{name}"));
     machine::start();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,

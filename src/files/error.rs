@@ -1,6 +1,6 @@
 use super::document::readable;
 use super::input::Refused;
-use super::{LockError, shown};
+use super::{LockError, Setting, shown};
 use crate::quantity::Problem;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ pub enum FileError {
         what: String,
     },
     /// The output folder holds something that is not ours to replace.
-    #[error("{}: {what}; move that elsewhere, or choose an empty or new folder with --out", shown(.path).display())]
+    #[error("{}: {what}; move that elsewhere, or choose an empty or new folder ({})", shown(.path).display(), Setting("out"))]
     Occupied {
         /// The folder.
         path: PathBuf,
@@ -79,7 +79,7 @@ pub enum FileError {
         what: String,
     },
     /// A file that would be replaced is not what the program wrote there.
-    #[error("{}: is not as weavelight wrote it, and would be lost; move it elsewhere, or choose another --out", shown(.path).display())]
+    #[error("{}: is not as weavelight wrote it, and would be lost; move it elsewhere, or choose another {}", shown(.path).display(), Setting("out"))]
     NotOurs {
         /// The file.
         path: PathBuf,
@@ -129,25 +129,21 @@ pub(crate) fn read_advice(source: &io::Error) -> String {
 }
 
 fn write_advice(source: &io::Error) -> String {
-    match source.kind() {
+    let out = Setting("out");
+    let what = match source.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            "no space left on this disk; free some or choose another --out".to_owned()
+            "no space left on this disk; free some or choose"
         }
         io::ErrorKind::FileTooLarge => {
-            "the file would be larger than its disk or a limit allows (see ulimit -f); raise the limit or choose another --out".to_owned()
+            "the file would be larger than its disk or a limit allows (see ulimit -f); raise the limit or choose"
         }
-        io::ErrorKind::ReadOnlyFilesystem => {
-            "the disk is read-only; choose another --out".to_owned()
+        io::ErrorKind::ReadOnlyFilesystem => "the disk is read-only; choose",
+        io::ErrorKind::PermissionDenied => "may not be written; check its permissions or choose",
+        io::ErrorKind::NotADirectory => "a part of this path is a file, not a folder; choose",
+        io::ErrorKind::AlreadyExists => "something that is no folder has this name; choose",
+        _ => {
+            return format!("cannot be written ({source}); check the disk or choose another {out}");
         }
-        io::ErrorKind::PermissionDenied => {
-            "may not be written; check its permissions or choose another --out".to_owned()
-        }
-        io::ErrorKind::NotADirectory => {
-            "a part of this path is a file, not a folder; choose another --out".to_owned()
-        }
-        io::ErrorKind::AlreadyExists => {
-            "something that is no folder has this name; choose another --out".to_owned()
-        }
-        _ => format!("cannot be written ({source}); check the disk or choose another --out"),
-    }
+    };
+    format!("{what} another {out}")
 }

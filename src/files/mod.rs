@@ -17,6 +17,7 @@ mod lock;
 mod lock_file;
 mod owned;
 mod provenance;
+mod setting;
 mod shown;
 mod signals;
 mod staged;
@@ -43,6 +44,7 @@ pub use owned::{
     write_owned, write_owned_toml,
 };
 pub use provenance::{Input, Provenance, ProvenanceTable};
+pub use setting::{Setting, name_settings, plain_words};
 pub use shown::{WORK_FOLDER, shown};
 pub use signals::survive_size_limits;
 pub use staged::{OutputKind, StagedFolder};

@@ -3,17 +3,17 @@
 pub enum GpuError {
     /// Built without the feature.
     #[error(
-        "this program was built without its GPU part; build it with `cargo build --release --features gpu`, or leave --device gpu out"
+        "this program was built without its GPU part; build it with its `gpu` feature, or solve on the processor"
     )]
     NotBuilt,
     /// No adapter.
     #[error(
-        "no Vulkan device was found; install the graphics card's Vulkan driver (Debian: mesa-vulkan-drivers, which also has one in software), or leave --device gpu out"
+        "no Vulkan device was found; install the graphics card's Vulkan driver (Debian: mesa-vulkan-drivers, which also has one in software), or solve on the processor"
     )]
     NoAdapter,
     /// The adapter refuses to work.
     #[error(
-        "{adapter} cannot be used ({why}); update its Vulkan driver, or leave --device gpu out"
+        "{adapter} cannot be used ({why}); update its Vulkan driver, or solve on the processor"
     )]
     Unusable {
         /// Its name.

@@ -21,7 +21,7 @@ pub struct NoMemory {
     /// What limits it, as in "ulimit -v".
     pub limit: &'static str,
     /// What to do.
-    pub remedy: &'static str,
+    pub remedy: String,
 }
 
 /// Sees that `needed` bytes are to be had.
@@ -31,14 +31,14 @@ pub struct NoMemory {
 pub fn check_memory(
     what: impl FnOnce() -> String,
     needed: u64,
-    remedy: &'static str,
+    remedy: impl Into<String>,
 ) -> Result<(), NoMemory> {
     let Some((available, limit)) = available_bytes() else { return Ok(()) };
     let needed = needed.saturating_add(BESIDE_BYTES);
     if needed <= available {
         return Ok(());
     }
-    Err(NoMemory { what: what(), needed, available, limit, remedy })
+    Err(NoMemory { what: what(), needed, available, limit, remedy: remedy.into() })
 }
 
 /// Bytes that this process may still take, and what limits them; `None` where the system does not say.

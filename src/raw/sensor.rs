@@ -117,7 +117,7 @@ pub(crate) fn mosaic(found: Option<Cfa>, hint: &Hint) -> Result<Layout, DecodeEr
         (Some(cfa), _) | (None, Some(cfa)) => Ok(Layout::Mosaic(cfa)),
         (None, None) => Err(DecodeError::unsupported(
             "a mosaic of unknown colours",
-            "declare cfa = \"RGGB\" (import: --cfa RGGB), or as the camera has it",
+            "declare cfa = \"RGGB\" (when importing), or as the camera has it",
         )),
     }
 }

@@ -1,4 +1,4 @@
-use crate::files::FileError;
+use crate::files::{FileError, Setting};
 use crate::session::SessionError;
 use std::path::PathBuf;
 
@@ -17,8 +17,8 @@ pub enum SimulateError {
     /// An option that makes no sense.
     #[error("{option} is {value}; {remedy}")]
     Option {
-        /// As on the command line.
-        option: &'static str,
+        /// Which.
+        option: Setting,
         /// What was given.
         value: String,
         /// What it may be.

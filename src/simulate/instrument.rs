@@ -1,5 +1,5 @@
 use super::{Options, Scene, SimulateError};
-use crate::files::{Provenance, sha256_of_file};
+use crate::files::{Provenance, Setting, sha256_of_file};
 use crate::instrument::{
     CalibratedLight, CameraKind, Color, Controller, MeasuredCamera, Noise, Optics, Rig, RigCamera,
     RigLight, RigLightPlace, write_camera, write_color, write_lights,
@@ -237,10 +237,12 @@ fn check_size(options: &Options, camera: &RigCamera) -> Result<(), SimulateError
             Err(SimulateError::Rig { path: path.clone(), what })
         }
         _ => Err(SimulateError::Option {
-            option: "--size",
+            option: Setting("size"),
             value,
-            remedy: "sides of 16 to 32768 pixels can be simulated, as in --size 1232x816"
-                .to_owned(),
+            remedy: format!(
+                "sides of 16 to 32768 pixels can be simulated, as in {} 1232x816",
+                Setting("size")
+            ),
         }),
     }
 }
@@ -299,9 +301,9 @@ fn true_lights(rig: &Rig, seed: u64) -> Vec<Light> {
 fn check_lights(options: &Options, stage: &Stage) -> Result<(), SimulateError> {
     let count = stage.lights.len();
     let named = [
-        ("--hand", options.targets.hand.map(|k| vec![k])),
-        ("--dead", options.flaws.dead.map(|k| vec![k])),
-        ("--swapped", options.flaws.swapped.map(|pair| pair.to_vec())),
+        (Setting("hand"), options.targets.hand.map(|k| vec![k])),
+        (Setting("dead"), options.flaws.dead.map(|k| vec![k])),
+        (Setting("swapped"), options.flaws.swapped.map(|pair| pair.to_vec())),
     ];
     for (option, lights) in named {
         if let Some(light) = lights.into_iter().flatten().find(|&light| light >= count) {

@@ -21,7 +21,7 @@ pub use options::{Flaws, Material, Options, Part, Targets};
 pub use scene::{SCENE_FILE, Scene};
 pub use table::{Laid, Lying, lay};
 
-use crate::files::{FileError, OutputKind, StagedFolder, check_owned};
+use crate::files::{FileError, OutputKind, Setting, StagedFolder, check_owned};
 use crate::machine::check_memory;
 use parts::Studio;
 use std::path::PathBuf;
@@ -92,7 +92,11 @@ fn check_room(options: &Options, instrument: &Instrument) -> Result<(), Simulate
     let frames = (instrument.stage.lights.len() + 12).max(options.targets.boards) as u64;
     let bytes = (width * height) as u64 * (2 * frames + TRUTH_BYTES_PER_PX);
     let what = || format!("simulating {frames} frames of {width} x {height}");
-    Ok(check_memory(what, bytes, "give a smaller --size, or close other programs")?)
+    Ok(check_memory(
+        what,
+        bytes,
+        format!("give a smaller {}, or close other programs", Setting("size")),
+    )?)
 }
 
 /// Writes only what a technician has before the first picture, `rig.toml`, and the `scene.toml` that the simulated camera

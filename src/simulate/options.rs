@@ -1,4 +1,5 @@
 use super::SimulateError;
+use crate::files::Setting;
 use std::path::PathBuf;
 use weavelight_sim::cloth::{Preset, Print, Structure, Wrinkles};
 use weavelight_sim::render::{Bounce, Extent, Fabric};
@@ -246,35 +247,35 @@ impl Options {
         let (material, targets, flaws) = (&self.material, &self.targets, &self.flaws);
         let [width_mm, height_mm] = material.extent_mm.unwrap_or([100.0; 2]);
         let limits = [
-            ("--threads-per-cm", material.threads_per_cm.unwrap_or(10.0), 1.0, 200.0),
-            ("--yarn-radius-mm", material.yarn_radius_mm.unwrap_or(0.3), 0.01, 5.0),
-            ("--wrinkles-mm", material.wrinkles_mm, 0.0, 10.0),
-            ("--thickness-mm", material.thickness_mm, 0.0, 100.0),
-            ("--swatch-mm (width)", width_mm, 1.0, 1e4),
-            ("--swatch-mm (height)", height_mm, 1.0, 1e4),
-            ("--samples", material.samples.unwrap_or(1) as f64, 1.0, 16.0),
-            ("--boards", targets.boards as f64, 1.0, 999.0),
-            ("--square-mm", targets.square_mm.unwrap_or(25.0), 0.5, 200.0),
-            ("--board-thickness-mm", targets.board_thickness_mm, 0.0, 50.0),
-            ("--raised-mm", targets.raised_mm, 0.0, 300.0),
-            ("--tilts", targets.tilts as f64, 0.0, 99.0),
-            ("--tilt-deg", targets.tilt_deg, 0.0, 45.0),
-            ("--unevenness", targets.unevenness, 0.0, 0.5),
-            ("--kappa", targets.kappa, 0.0, 0.5),
-            ("--dust", targets.dust_per_dm2, 0.0, 600.0),
-            ("--ruler-error-mm", flaws.ruler_error_mm, 0.0, 100.0),
-            ("--vignetting", flaws.vignetting, 0.0, 0.9),
-            ("--ambient", flaws.ambient, 0.0, 1000.0),
-            ("--drift", flaws.drift, -0.9, 9.0),
-            ("--exposure-factor", flaws.exposure_factor, 1e-3, 1e3),
-            ("--bend", flaws.bend, -0.3, 0.3),
-            ("--defects", flaws.defects, 0.0, 0.5),
-            ("--prnu", flaws.prnu, 0.0, 0.2),
-            ("--read-noise-e", flaws.read_noise_e, 0.0, 1000.0),
+            ("threads-per-cm", material.threads_per_cm.unwrap_or(10.0), 1.0, 200.0),
+            ("yarn-radius-mm", material.yarn_radius_mm.unwrap_or(0.3), 0.01, 5.0),
+            ("wrinkles-mm", material.wrinkles_mm, 0.0, 10.0),
+            ("thickness-mm", material.thickness_mm, 0.0, 100.0),
+            ("swatch-mm", width_mm, 1.0, 1e4),
+            ("swatch-mm", height_mm, 1.0, 1e4),
+            ("samples", material.samples.unwrap_or(1) as f64, 1.0, 16.0),
+            ("boards", targets.boards as f64, 1.0, 999.0),
+            ("square-mm", targets.square_mm.unwrap_or(25.0), 0.5, 200.0),
+            ("board-thickness-mm", targets.board_thickness_mm, 0.0, 50.0),
+            ("raised-mm", targets.raised_mm, 0.0, 300.0),
+            ("tilts", targets.tilts as f64, 0.0, 99.0),
+            ("tilt-deg", targets.tilt_deg, 0.0, 45.0),
+            ("unevenness", targets.unevenness, 0.0, 0.5),
+            ("kappa", targets.kappa, 0.0, 0.5),
+            ("dust", targets.dust_per_dm2, 0.0, 600.0),
+            ("ruler-error-mm", flaws.ruler_error_mm, 0.0, 100.0),
+            ("vignetting", flaws.vignetting, 0.0, 0.9),
+            ("ambient", flaws.ambient, 0.0, 1000.0),
+            ("drift", flaws.drift, -0.9, 9.0),
+            ("exposure-factor", flaws.exposure_factor, 1e-3, 1e3),
+            ("bend", flaws.bend, -0.3, 0.3),
+            ("defects", flaws.defects, 0.0, 0.5),
+            ("prnu", flaws.prnu, 0.0, 0.2),
+            ("read-noise-e", flaws.read_noise_e, 0.0, 1000.0),
         ];
         limits
             .into_iter()
-            .try_for_each(|(option, value, least, most)| in_range(option, value, least, most))
+            .try_for_each(|(name, value, least, most)| in_range(Setting(name), value, least, most))
     }
 
     /// The fabric on the table.
@@ -326,7 +327,7 @@ fn preset_structure(preset: Preset) -> Structure {
     }
 }
 
-fn in_range(option: &'static str, value: f64, least: f64, most: f64) -> Result<(), SimulateError> {
+fn in_range(option: Setting, value: f64, least: f64, most: f64) -> Result<(), SimulateError> {
     // Written so that NaN is out of any range.
     if value >= least && value <= most {
         return Ok(());

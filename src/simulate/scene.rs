@@ -3,7 +3,7 @@
 
 use super::table::{TableTable, lying_from_table, table_from_lying};
 use super::{Flaws, Instrument, Lying, Material, Options, SimulateError};
-use crate::files::{Document, FileError, SCHEMA, write_toml};
+use crate::files::{Document, FileError, SCHEMA, Setting, write_toml};
 use crate::instrument::{Rig, RigLightPlace};
 use crate::quantity::{DIRECTION, check_light_place};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -50,6 +50,16 @@ struct SceneFile {
 
 fn first_seed() -> u64 {
     1
+}
+
+/// Where `scene.toml` says what a setting is.
+fn key_of(setting: Setting) -> String {
+    let table = match setting.0 {
+        "threads-per-cm" | "yarn-radius-mm" | "wrinkles-mm" | "thickness-mm" | "swatch-mm"
+        | "samples" => "material",
+        _ => "flaws",
+    };
+    format!("{table}.{}", setting.0.replace('-', "_"))
 }
 
 #[derive(Default, Serialize, Deserialize)]
@@ -120,9 +130,15 @@ impl Scene {
             let (rig, places) = (rig.to_owned(), Vec::new());
             return Ok(Self { rig, seed, material, flaws, places, table: Lying::Swatch });
         }
-        let scene = scene_from_document(&Document::read(&path)?, rig)?;
-        scene.options().check()?;
-        Ok(scene)
+        let document = Document::read(&path)?;
+        let scene = scene_from_document(&document, rig)?;
+        match scene.options().check() {
+            Err(SimulateError::Option { option, value, remedy }) => {
+                let what = format!("is {value}; {remedy}");
+                Err(document.invalid(&key_of(option), &what).into())
+            }
+            checked => checked.map(|()| scene),
+        }
     }
 
     /// Writes it beside `rig.toml` in `folder`.

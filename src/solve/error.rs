@@ -1,4 +1,4 @@
-use crate::files::FileError;
+use crate::files::{FileError, Setting};
 use crate::gpu::GpuError;
 use crate::machine::NoMemory;
 use crate::raw::ReadError;
@@ -39,7 +39,7 @@ pub enum SolveError {
         calibration: PathBuf,
     },
     /// `--undistort` without a camera.
-    #[error("{}: there is no camera.toml, so there is no distortion to undo; leave out --undistort", .calibration.display())]
+    #[error("{}: there is no camera.toml, so there is no distortion to undo; leave out {}", .calibration.display(), Setting("undistort"))]
     NothingToUndistort {
         /// The folder.
         calibration: PathBuf,
@@ -135,7 +135,7 @@ pub enum SolveError {
         frames: String,
     },
     /// A mask that is not the one found.
-    #[error("{}: is not the mask that is found in the frames, so it may have been edited and was kept; --force replaces it", .path.display())]
+    #[error("{}: is not the mask that is found in the frames, so it may have been edited and was kept; {} replaces it", .path.display(), Setting("force"))]
     EditedMask {
         /// The mask.
         path: PathBuf,

@@ -7,6 +7,7 @@ use super::options::MaskChoice;
 use super::progress::{Progress, Stage};
 use super::scene::{Exposure, Origin, PhotographedLight, Scene};
 use super::{Options, SolveError};
+use crate::files::Setting;
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, Calibration, LIGHTS_FILE, Optics};
 use crate::machine::check_memory;
 use crate::raster::decode_mask;
@@ -258,7 +259,10 @@ fn check_room(frame: &Frame, total: usize) -> Result<(), SolveError> {
     let pixels = (frame.width * frame.height) as u64;
     let at_least = samples * (total as u64).saturating_sub(FILES_AT_ONCE as u64);
     let what = || format!("solving {total} frames of {} x {}", frame.width, frame.height);
-    let remedy = "close other programs, raise the limit, or make a preview with --preview 4";
+    let remedy = format!(
+        "close other programs, raise the limit, or make a preview ({} 4)",
+        Setting("preview")
+    );
     Ok(check_memory(what, at_least + MAP_BYTES_PER_PX * pixels, remedy)?)
 }
 

@@ -3,6 +3,7 @@
 use super::plan::{Plan, Step};
 use super::sequencer::Judgement;
 use crate::device::look::{Look, difference};
+use crate::files::Setting;
 use std::collections::BTreeSet;
 
 /// A light that gives less than this share of what the others give has failed.
@@ -143,8 +144,9 @@ impl Assessor {
         let ((clipping, clipped), (brightest, high)) = (most(Look::clipped)?, most(Look::high)?);
         if clipped > CLIPPED && !bracketed {
             Some(format!(
-                "{:.1} % of the samples clip under {clipping}; use a shorter exposure (or --bracket 0.25 for glossy cloth).",
-                100.0 * clipped
+                "{:.1} % of the samples clip under {clipping}; use a shorter exposure (or {} 0.25 for glossy cloth).",
+                100.0 * clipped,
+                Setting("bracket")
             ))
         } else if high < UNDEREXPOSED {
             Some(format!(

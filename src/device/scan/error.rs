@@ -1,6 +1,6 @@
 use crate::device::board::BoardError;
 use crate::device::camera::CameraError;
-use crate::files::FileError;
+use crate::files::{FileError, Setting};
 use crate::session::SessionError;
 use std::path::PathBuf;
 
@@ -37,17 +37,18 @@ pub enum ScanError {
     },
     /// A bracket that makes no sense.
     #[error(
-        "--bracket: {factor} makes no sense; give exposures relative to the scan's, each once and other than 1, as in --bracket 0.25,4"
+        "{bracket}: {factor} makes no sense; give exposures relative to the scan's, each once and other than 1, as in {bracket} 0.25,4",
+        bracket = Setting("bracket")
     )]
     Bracket {
         /// The first bad one.
         factor: f64,
     },
     /// A bracket where the target's own exposures are what is wanted.
-    #[error("--bracket is for swatches and white sheets; leave it out")]
+    #[error("{} is for swatches and white sheets; leave it out", Setting("bracket"))]
     BracketOfTarget,
     /// A light that the rig does not have.
-    #[error("--light is {light}; the rig has lights 0 to {last}")]
+    #[error("{} is {light}; the rig has lights 0 to {last}", Setting("light"))]
     NoSuchLight {
         /// What was asked for.
         light: usize,
@@ -56,14 +57,15 @@ pub enum ScanError {
     },
     /// A bracket with a camera that cannot be set.
     #[error(
-        "--bracket needs a camera that the program can set, but this one is set by hand; scan without it, or tether the camera"
+        "{} needs a camera that the program can set, but this one is set by hand; scan without it, or tether the camera",
+        Setting("bracket")
     )]
     BracketByHand,
     /// An exposure that makes no sense.
     #[error("{option} is {value}; give a number from {least} to {most}")]
     Option {
-        /// As on the command line.
-        option: &'static str,
+        /// Which.
+        option: Setting,
         /// What was given.
         value: f64,
         /// What it may be.
@@ -77,7 +79,7 @@ pub enum ScanError {
     )]
     NoThread(std::io::Error),
     /// The target holds a capture session.
-    #[error("{}: holds a capture session already ({name}, {frames} frames); continue it with --resume, or choose another --out", .folder.display())]
+    #[error("{}: holds a capture session already ({name}, {frames} frames); continue it with {}, or choose another {}", .folder.display(), Setting("resume"), Setting("out"))]
     Taken {
         /// The folder.
         folder: PathBuf,
@@ -87,7 +89,7 @@ pub enum ScanError {
         frames: usize,
     },
     /// The capture session that is to be resumed or added to is another one.
-    #[error("{}: holds another capture session: {what}; choose another --out", .folder.display())]
+    #[error("{}: holds another capture session: {what}; choose another {}", .folder.display(), Setting("out"))]
     Another {
         /// The folder.
         folder: PathBuf,
@@ -95,7 +97,7 @@ pub enum ScanError {
         what: String,
     },
     /// Not enough room for the frames.
-    #[error("{}: {free_mb} MB free, but the frames need about {needed_mb} MB; free some, or choose another --out", .folder.display())]
+    #[error("{}: {free_mb} MB free, but the frames need about {needed_mb} MB; free some, or choose another {}", .folder.display(), Setting("out"))]
     NoRoom {
         /// The folder.
         folder: PathBuf,
@@ -117,7 +119,7 @@ pub enum ScanError {
         expected: String,
     },
     /// A file that does not say how it was exposed.
-    #[error("{file}: the file does not say its exposure time; give --exposure-s")]
+    #[error("{file}: the file does not say its exposure time; give the {}", Setting("exposure-s"))]
     ExposureUnknown {
         /// The frame's file.
         file: String,
@@ -148,7 +150,8 @@ pub enum ScanError {
     },
     /// No light shows under any light: the exposure is too short, or nothing shines.
     #[error(
-        "the pictures show no light under any LED at {exposure_s} s and ISO {iso}; give a longer --exposure-s or leave it out, take the lens cap off, and look whether the LEDs have power"
+        "the pictures show no light under any LED at {exposure_s} s and ISO {iso}; give a longer {} or leave it out, take the lens cap off, and look whether the LEDs have power",
+        Setting("exposure-s")
     )]
     NothingLit {
         /// Exposure time, seconds.
@@ -157,14 +160,15 @@ pub enum ScanError {
         iso: f64,
     },
     /// The capture session's folder vanished.
-    #[error("{}: this folder is gone, and the frames in it; bring it back (was its disk unplugged?) and continue with --resume, or scan into another", .folder.display())]
+    #[error("{}: this folder is gone, and the frames in it; bring it back (was its disk unplugged?) and continue with {}, or scan into another", .folder.display(), Setting("resume"))]
     FolderGone {
         /// The folder.
         folder: PathBuf,
     },
     /// Nothing to expose for.
     #[error(
-        "light {light} gives no light at {exposure_s} s; look whether it shines on the swatch, or give --exposure-s"
+        "light {light} gives no light at {exposure_s} s; look whether it shines on the swatch, or give the {}",
+        Setting("exposure-s")
     )]
     Dark {
         /// The light that was tried.
@@ -185,7 +189,7 @@ pub enum ScanError {
 fn resumable(kept: usize) -> String {
     match kept {
         0 => String::new(),
-        1 => ". One frame is safe; continue with --resume".to_owned(),
-        _ => format!(". {kept} frames are safe; continue with --resume"),
+        1 => format!(". One frame is safe; continue with {}", Setting("resume")),
+        _ => format!(". {kept} frames are safe; continue with {}", Setting("resume")),
     }
 }

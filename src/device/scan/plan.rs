@@ -261,7 +261,7 @@ pub(super) mod tests {
         assert!(left_out);
         assert_eq!(by_hand, Plan::new(&reference_rig(), &[]).unwrap());
         let error = Plan::of(&reference_rig(), &grey(), &[0.5], &[]).unwrap_err().to_string();
-        assert!(error.contains("--bracket is for swatches"), "{error}");
+        assert!(error.contains("bracket is for swatches"), "{error}");
     }
 
     #[test]
@@ -281,7 +281,7 @@ pub(super) mod tests {
         check(Pose::Free, &["board-table.dng", "board-07-take-2.nef", "other.nef"], "board-08");
         let subject = Subject::Board { board, pose: Pose::Free, light: 10 };
         let error = Plan::of(&reference_rig(), &subject, &[], &[]).unwrap_err().to_string();
-        assert!(error.contains("--light is 10; the rig has lights 0 to 9"), "{error}");
+        assert!(error.contains("light is 10; the rig has lights 0 to 9"), "{error}");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::subject::Subject;
 use super::summary::{Event, Seconds, Summary};
 use crate::device::board::{Board, BoardError, Failure};
 use crate::device::camera::{Camera, CameraError, Cure, Release, Settings};
-use crate::files::{FileError, InputKind, read_input, shown};
+use crate::files::{FileError, InputKind, Setting, read_input, shown};
 use crate::instrument::Rig;
 use crate::raw;
 use crate::session::{FrameEntry, Session};
@@ -117,8 +117,8 @@ pub fn scan(
 
 /// The plan, and whether exposures were left out of it; or what can be seen to be wrong before anything moves.
 fn check(rig: &Rig, options: &Options, camera: &dyn Camera) -> Result<(Plan, bool), ScanError> {
-    in_range("--exposure-s", options.exposure_s.unwrap_or(1.0), EXPOSURES_S)?;
-    in_range("--iso", options.iso, ISOS)?;
+    in_range(Setting("exposure-s"), options.exposure_s.unwrap_or(1.0), EXPOSURES_S)?;
+    in_range(Setting("iso"), options.iso, ISOS)?;
     let by_hand = camera.describe().release == Release::Outside;
     if !options.bracket.is_empty() && by_hand {
         return Err(ScanError::BracketByHand);
@@ -129,7 +129,7 @@ fn check(rig: &Rig, options: &Options, camera: &dyn Camera) -> Result<(Plan, boo
     Ok(if by_hand { plan.without_other_exposures() } else { (plan, false) })
 }
 
-fn in_range(option: &'static str, value: f64, [least, most]: [f64; 2]) -> Result<(), ScanError> {
+fn in_range(option: Setting, value: f64, [least, most]: [f64; 2]) -> Result<(), ScanError> {
     // Written so that NaN is out of any range.
     if value >= least && value <= most {
         return Ok(());

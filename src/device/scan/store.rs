@@ -5,7 +5,7 @@ use super::plan::{Plan, Step};
 use super::subject::{Pose, Subject};
 use crate::device::camera::Settings;
 use crate::files::{
-    FileError, Lock, UNFINISHED, WORK_FOLDER, clean_temporary, free_bytes, remove_noted,
+    FileError, Lock, Setting, UNFINISHED, WORK_FOLDER, clean_temporary, free_bytes, remove_noted,
 };
 use crate::session::{FrameEntry, Kind, MANIFEST, Session, SessionError, SessionWriter};
 use std::fs;
@@ -327,7 +327,11 @@ fn check_same(
     }
     let wanted = subject.plane(about.thickness_mm);
     if wanted.is_some() && wanted != session.plane {
-        return another("its plane is not at the given --thickness-mm or --plane-point".to_owned());
+        return another(format!(
+            "its plane is not at the given {} or {}",
+            Setting("thickness-mm"),
+            Setting("plane-point")
+        ));
     }
     if session.kind == Kind::Board {
         return Ok(()); // all pictures of one board go together

@@ -33,7 +33,7 @@ fn what_is_kept_is_found_again() {
     drop(store);
     assert!(!folder.join(WORK_FOLDER).exists());
     let error = open(&folder, Begin::Anew).unwrap_err().to_string();
-    assert!(error.contains("(linen, 3 frames); continue it with --resume"), "{error}");
+    assert!(error.contains("(linen, 3 frames); continue it with resume"), "{error}");
     // Files of a killed scan that nobody recorded.
     fs::write(folder.join("light-05.nef"), "half").unwrap();
     fs::create_dir(folder.join(WORK_FOLDER)).unwrap();

@@ -172,7 +172,7 @@ fn a_mosaic_that_is_not_stated_is_asked_for() {
     entries.retain(|(tag, _)| *tag != tag::CFA_PATTERN && *tag != tag::CFA_REPEAT);
     let bytes = container(Order::Little, UNKNOWN[4], entries);
     let error = decode(&bytes, &Hint::default()).unwrap_err().to_string();
-    assert!(error.contains("--cfa RGGB"), "{error}");
+    assert!(error.contains("cfa = \"RGGB\""), "{error}");
     let hint = Hint { cfa: Cfa::parse("BGGR"), encoding: None };
     assert_eq!(decode(&bytes, &hint).unwrap().layout, Layout::Mosaic(hint.cfa.unwrap()));
 }

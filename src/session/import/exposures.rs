@@ -1,6 +1,7 @@
 //! How long and how sensitively pictures were taken, from their files.
 
 use super::{ImportError, Options};
+use crate::files::Setting;
 use crate::quantity::{EXPOSURE_S, ISO};
 use crate::raw::Metadata;
 use std::path::{Path, PathBuf};
@@ -63,12 +64,12 @@ pub(super) fn settle(
     let iso = fill(stated, |s| s.iso, UNSTATED.iso, "ISO", &mut warnings)?;
     let differ = [&seconds, &iso].iter().any(|values| differing(values.iter().copied()).is_some());
     if has_intensities && differ {
-        warnings.push(
+        warnings.push(format!(
             "the files state different exposures, and signals are divided by them and by \
              light_intensities.txt; if these pictures or intensities already include the exposure, \
-             import with --same-exposure"
-                .to_owned(),
-        );
+             import with {}",
+            Setting("same-exposure")
+        ));
     }
     let exposures = seconds.into_iter().zip(iso);
     Ok((exposures.map(|(seconds, iso)| Exposure { seconds, iso }).collect(), warnings))

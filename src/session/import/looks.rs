@@ -1,5 +1,6 @@
 //! What pictures look like that they should not: copies of each other, or an undemosaiced mosaic.
 
+use crate::files::Setting;
 use crate::raw::{Frame, Layout, Samples};
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hasher};
@@ -105,8 +106,9 @@ pub(super) fn mosaic(looks: &[Look]) -> Option<String> {
     places?;
     Some(format!(
         "the grey pictures look like a colour sensor's mosaic: the four places of every 2 x 2 cell differ by {:.0} % or \
-         more, the same way in every picture; if they are one, import again with --cfa RGGB (or as the camera has it)",
-        100.0 * least
+         more, the same way in every picture; if they are one, import again with {} RGGB (or as the camera has it)",
+        100.0 * least,
+        Setting("cfa")
     ))
 }
 

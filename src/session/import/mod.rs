@@ -19,7 +19,9 @@ use self::numbers::{Gathered, encoding_of};
 use self::pairs::Pair;
 use self::pictures::Frame;
 use super::{Encoding, FrameEntry, Kind, Session, SessionError};
-use crate::files::{FileError, Input, OutputKind, Provenance, StagedFolder, sha256_of_file};
+use crate::files::{
+    FileError, Input, OutputKind, Provenance, Setting, StagedFolder, sha256_of_file,
+};
 use crate::instrument::{
     COLOR_FILE, CalibratedLight, Color, LIGHT_COUNT, write_color, write_lights,
 };
@@ -81,10 +83,10 @@ pub enum ImportError {
     #[error(transparent)]
     Session(#[from] SessionError),
     /// An 8-bit picture whose encoding is not declared.
-    #[error("{}: has 8 bits and does not say how they encode light; add --encoding srgb (most cameras) or --encoding linear", .0.display())]
+    #[error("{}: has 8 bits and does not say how they encode light; add {encoding} srgb (most cameras) or {encoding} linear", .0.display(), encoding = Setting("encoding"))]
     EncodingUnknown(PathBuf),
     /// A picture whose file names a curve that cannot be applied.
-    #[error("{}: {by} says how it encodes light, but {why}; add --encoding srgb or --encoding linear, or save it as sRGB or linear", .path.display())]
+    #[error("{}: {by} says how it encodes light, but {why}; add {encoding} srgb or {encoding} linear, or save it as sRGB or linear", .path.display(), encoding = Setting("encoding"))]
     EncodingUnreadable {
         /// The picture.
         path: PathBuf,
@@ -104,7 +106,7 @@ pub enum ImportError {
         what: String,
     },
     /// A RAW or floating-point picture that is said to be sRGB-encoded.
-    #[error("{}: {format} holds linear values; leave out --encoding srgb", .path.display())]
+    #[error("{}: {format} holds linear values; leave out {} srgb", .path.display(), Setting("encoding"))]
     EncodingContradicted {
         /// The picture.
         path: PathBuf,
@@ -112,7 +114,7 @@ pub enum ImportError {
         format: &'static str,
     },
     /// A picture that is no mosaic, or another than the one given.
-    #[error("{}: --cfa {declared} is given, but this file holds {found}; leave out --cfa, or correct it", .path.display())]
+    #[error("{}: {cfa} {declared} is given, but this file holds {found}; leave out {cfa}, or correct it", .path.display(), cfa = Setting("cfa"))]
     CfaContradicted {
         /// The picture.
         path: PathBuf,
@@ -122,7 +124,7 @@ pub enum ImportError {
         found: String,
     },
     /// Exposures of which some are known and differ, and some are not.
-    #[error("{}: states no {what}, but the others state {low} to {high}; give pictures that all state it, or --same-exposure if all were equally exposed", .path.display())]
+    #[error("{}: states no {what}, but the others state {low} to {high}; give pictures that all state it, or {} if all were equally exposed", .path.display(), Setting("same-exposure"))]
     ExposureMixed {
         /// The picture that is silent.
         path: PathBuf,
@@ -134,7 +136,7 @@ pub enum ImportError {
         high: String,
     },
     /// Pictures of several apertures.
-    #[error("{}: was taken at f/{found}, but {} at f/{expected}; take all pictures at one aperture, or give --same-exposure if they were normalised already", .path.display(), .first.display())]
+    #[error("{}: was taken at f/{found}, but {} at f/{expected}; take all pictures at one aperture, or give {} if they were normalised already", .path.display(), .first.display(), Setting("same-exposure"))]
     Aperture {
         /// The odd one.
         path: PathBuf,

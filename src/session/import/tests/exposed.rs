@@ -123,7 +123,7 @@ fn intensities_that_may_hold_the_exposure_are_told() {
     let at = |under| (Some([1, under]), Some(100), None);
     let intensities = Some("1 1 1\n1 1 1\n1 1 1\n");
     let (_, summary) = import([at(4), at(4), at(2)], false, intensities).unwrap();
-    assert!(summary.warnings[0].contains("import with --same-exposure"), "{:?}", summary.warnings);
+    assert!(summary.warnings[0].contains("import with same exposure"), "{:?}", summary.warnings);
     let (_, summary) = import([at(4), at(4), at(4)], false, intensities).unwrap();
     assert_eq!(summary.warnings, Vec::<String>::new());
 }
