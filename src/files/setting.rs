@@ -23,7 +23,6 @@ pub fn plain_words(name: &str) -> String {
     match name {
         "out" => "output folder".to_owned(),
         "iso" => "ISO".to_owned(),
-        "cfa" => "mosaic".to_owned(),
         name => {
             let unit = ["-mm", "-s", "-deg", "-e"].iter().find_map(|unit| name.strip_suffix(unit));
             unit.unwrap_or(name).replace('-', " ")

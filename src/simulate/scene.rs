@@ -352,7 +352,10 @@ mod tests {
         };
         check("schema = 1\n[material]\npreset = \"felt\"\n", "choose one of linen");
         check("schema = 1\n[[lights]]\n", "needs position_mm");
-        check("schema = 1\n[flaws]\nprnu = 3.0\n", "--prnu is 3");
+        check(
+            "schema = 1\n[flaws]\nprnu = 3.0\n",
+            ":3: `flaws.prnu` is 3; give a number from 0 to 0.2",
+        );
         check("schema = 2\n", "schema 2");
         check("schema = 1\n[table]\nlies = \"cat\"\n", "swatch, board, grey or white");
         check("schema = 1\n[table]\nlies = \"board\"\npose = 99\n", "poses 0 to 15");

@@ -167,12 +167,12 @@ fn impossible_options_are_named_and_leave_nothing() {
         assert!(error.contains(expected), "{error}");
         assert_eq!(fs::read_dir(temp.path()).unwrap().count(), 0);
     };
-    check(&|o| o.material.thickness_mm = -1.0, "--thickness-mm is -1;");
-    check(&|o| o.material.thickness_mm = f64::NAN, "--thickness-mm is NaN;");
-    check(&|o| o.material.threads_per_cm = Some(0.0), "--threads-per-cm is 0;");
-    check(&|o| o.size_px = Some([0, 100]), "--size is 0x100;");
-    check(&|o| o.size_px = Some([100, 1 << 40]), "--size");
-    check(&|o| o.flaws.dead = Some(10), "--dead is 10;");
+    check(&|o| o.material.thickness_mm = -1.0, "thickness is -1;");
+    check(&|o| o.material.thickness_mm = f64::NAN, "thickness is NaN;");
+    check(&|o| o.material.threads_per_cm = Some(0.0), "threads per cm is 0;");
+    check(&|o| o.size_px = Some([0, 100]), "size is 0x100;");
+    check(&|o| o.size_px = Some([100, 1 << 40]), "size");
+    check(&|o| o.flaws.dead = Some(10), "dead is 10;");
     check(&|o| o.rig = Some("nowhere.toml".into()), "nowhere.toml");
 }
 

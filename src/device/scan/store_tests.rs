@@ -142,7 +142,7 @@ fn another_capture_session_is_refused() {
         assert!(error.to_string().contains(expected), "{error}");
     };
     check(About { name: Some("denim".into()), ..ABOUT }, &plan(), "not \"denim\"");
-    check(About { thickness_mm: Some(2.0), ..ABOUT }, &plan(), "--thickness-mm");
+    check(About { thickness_mm: Some(2.0), ..ABOUT }, &plan(), "thickness or plane point");
     let mut fewer = reference_rig();
     fewer.lights.truncate(5);
     check(ABOUT, &Plan::new(&fewer, &[]).unwrap(), "light-08.nef is no frame of this scan");

@@ -130,7 +130,7 @@ fn a_mosaic_is_imported_as_one_and_suspected_where_it_is_not_said() {
     let error = set.import(&options).unwrap_err();
     assert_eq!(
         error,
-        "a.png: --cfa GBRG is given, but this file holds an RGB picture; leave out --cfa, or correct it"
+        "a.png: cfa GBRG is given, but this file holds an RGB picture; leave out cfa, or correct it"
     );
 }
 
