@@ -2,7 +2,9 @@
 //! in a sentence, not in the middle of a picture.
 
 mod memory;
+mod quiet;
 mod threads;
 
 pub use memory::{NoMemory, available_bytes, check_memory};
+pub use quiet::Quiet;
 pub use threads::{Pool, spawn, start, thread_count};
