@@ -134,10 +134,9 @@ fn subject(
         Task::Chart => {
             let patches = if simulated {
                 target.patches
-            } else if settings.chart.trim().is_empty() {
-                return Err(texts::NO_CHART.into());
             } else {
-                Target::load(Path::new(settings.chart.trim()))?.patches
+                let chart = crate::paths::typed(&settings.chart).ok_or(texts::NO_CHART)?;
+                Target::load(&chart)?.patches
             };
             (Subject::Grey { patches }, None)
         }
