@@ -38,12 +38,24 @@ pub struct App {
     closes: bool,
 }
 
+/// The window cannot work.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", texts::shell::no_thread(texts::shell::threads::WINDOW, .0))]
+pub struct NoThreads(std::io::Error);
+
 impl App {
     /// A window as it was when it was closed. `renderer`: where the Look room puts its textures; the window works without.
-    pub fn new(ctx: &egui::Context, renderer: Option<&RenderState>, settings: Settings) -> Self {
+    ///
+    /// # Errors
+    /// Where the system gives no threads; a sentence with the remedy.
+    pub fn new(
+        ctx: &egui::Context,
+        renderer: Option<&RenderState>,
+        settings: Settings,
+    ) -> Result<Self, NoThreads> {
         theme::apply(ctx, &settings);
         look::view::install(ctx, renderer);
-        let worker = Worker::start(ctx.clone());
+        let worker = Worker::start(ctx.clone()).map_err(NoThreads)?;
         let mut desk = Desk::new(settings.clone());
         if let Some(aside) = settings.put_aside() {
             desk.tell(Problem::warning(texts::SETTINGS, texts::settings_put_aside(aside)));
@@ -56,7 +68,7 @@ impl App {
             }
             None => {}
         }
-        Self {
+        Ok(Self {
             window: Geometry::new(&settings),
             problems: Problems::default(),
             question: None,
@@ -72,7 +84,7 @@ impl App {
             look: Look::default(),
             scans: Scans::default(),
             shown: None,
-        }
+        })
     }
 
     /// What all rooms share.

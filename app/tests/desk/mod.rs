@@ -39,12 +39,16 @@ impl Window {
             egui::Theme::Light => weavelight_app::settings::Theme::Light,
         };
         change(&mut settings);
+        let quiet = weavelight::machine::Quiet::begin();
         let harness = Harness::builder()
             .with_size(size)
             .with_theme(theme)
             .with_max_steps(64)
             .wgpu()
-            .build_eframe(|cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings));
+            .build_eframe(|cc| {
+                App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings).unwrap()
+            });
+        drop(quiet);
         Self { harness, home }
     }
 
