@@ -215,6 +215,18 @@ impl Scan {
     /// The form, and below it, whatever else there is, what the room is about.
     fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         let running = self.is_running();
+        // The form first, so that Tab goes through it before it comes to the button.
+        let mut above = ui.available_rect_before_wrap();
+        above.max.y -= form::BUTTON_HEIGHT;
+        let mut form = ui.new_child(egui::UiBuilder::new().id_salt("scan form").max_rect(above));
+        egui::ScrollArea::vertical().show(&mut form, |ui| {
+            ui.heading(crate::texts::rooms::SCAN);
+            self.offer_unfinished(ui, desk);
+            self.offer_undo(ui, desk);
+            tell_expired(ui, desk);
+            ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
+            widgets::reveal_focus(ui);
+        });
         egui::Panel::bottom("scan buttons").exact_size(form::BUTTON_HEIGHT).show(ui, |ui| {
             ui.add_space(theme::GAP);
             let known = !self.buttons.are_new(ui, running);
@@ -224,16 +236,6 @@ impl Scan {
                 } else if self.form.button(ui, desk, self.is_done(desk)) {
                     self.go(desk);
                 }
-            });
-        });
-        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| {
-                ui.heading(crate::texts::rooms::SCAN);
-                self.offer_unfinished(ui, desk);
-                self.offer_undo(ui, desk);
-                tell_expired(ui, desk);
-                ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
-                widgets::reveal_focus(ui);
             });
         });
     }

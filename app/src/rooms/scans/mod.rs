@@ -159,6 +159,7 @@ impl Scans {
                 ui.spacing_mut().item_spacing = vec2(theme::WIDE_GAP, theme::WIDE_GAP);
                 found.iter().for_each(|entry| self.card(ui, entry, desk));
             });
+            widgets::reveal_focus(ui);
         });
     }
 
