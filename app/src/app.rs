@@ -53,6 +53,7 @@ impl App {
         renderer: Option<&RenderState>,
         settings: Settings,
     ) -> Result<Self, NoThreads> {
+        crate::clock::start();
         theme::apply(ctx, &settings);
         look::view::install(ctx, renderer);
         let worker = Worker::start(ctx.clone()).map_err(NoThreads)?;
@@ -137,7 +138,7 @@ impl App {
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
-                desk.held_by = None;
+                (desk.held_by, desk.is_calibrated) = (None, false);
                 desk.problems.retain(|problem| problem.area != Some(Area::Opening));
                 self.scan.reset(desk);
                 self.scans.reset(desk);
@@ -145,6 +146,11 @@ impl App {
                 self.calibrate.reset();
             }
             Update::Held(folder, holder) => self.held(&folder, holder),
+            Update::Calibrated(folder, is) => {
+                if desk.place.as_ref().is_some_and(|place| place.folder == folder) {
+                    desk.is_calibrated = is;
+                }
+            }
             Update::CalibrationAge(days) => desk.calibration_age_days = days,
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),

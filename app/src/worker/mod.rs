@@ -127,6 +127,8 @@ pub enum Update {
     Opened(Box<Place>),
     /// Which other program holds the rig in a folder, in words.
     Held(PathBuf, Option<String>),
+    /// Whether the lights of the rig in a folder are calibrated.
+    Calibrated(PathBuf, bool),
     /// How old its calibration is, days.
     CalibrationAge(Option<i64>),
     /// For the Rig room.

@@ -54,6 +54,7 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         out.tell(Update::Calibrate(Told::Halted(ended)));
     }
     let state = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
+    out.tell(Update::Calibrated(place.folder.clone(), place.is_calibrated()));
     out.tell(Update::Calibrate(match state {
         Ok(state) => Told::State(Box::new(state)),
         Err(ended) => Told::Halted(ended),

@@ -4,7 +4,6 @@ use super::{Ask, Order, What};
 use crate::desk::Desk;
 use crate::names::Taken;
 use crate::number::{Number, Unit};
-use crate::place::Place;
 use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
 use crate::worker::Command;
 use crate::{texts::scan as texts, theme, widgets};
@@ -166,9 +165,8 @@ impl Form {
     pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk, done: bool) -> bool {
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
         let text = if done { texts::NEXT } else { texts::SCAN };
-        let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
         // Without a calibration the room is about getting one.
-        let button = match calibrated {
+        let button = match desk.is_calibrated {
             true => widgets::primary(ui, text, size, self.can_go(desk, done)),
             false => widgets::large(ui, text, size, self.can_go(desk, done)),
         };

@@ -18,7 +18,6 @@ pub use work::SolvedScan;
 
 use crate::desk::Desk;
 use crate::names::Taken;
-use crate::place::{Place, same};
 use crate::rooms::scans::{Deleted, Unfinished};
 use crate::rooms::{Room, look};
 use crate::settings::SolveSettings;
@@ -192,8 +191,7 @@ impl Scan {
         });
         egui::CentralPanel::default().show(ui, |ui| {
             self.result(ui, desk);
-            let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
-            match (self.is_running(), calibrated) {
+            match (self.is_running(), desk.is_calibrated) {
                 (false, false) => self.ask_to_calibrate(ui, desk),
                 (true, true) => self.view.ui(ui, texts::MAPS_COME),
                 (true, false) => self.view.ui(ui, texts::NO_MAPS),
@@ -408,7 +406,7 @@ impl Scan {
 
     /// A scan that was solved is the one that is shown; nothing of another one stays beside it.
     fn turn_to(&mut self, scan: &Path) {
-        let of = |about: &About| about.folder.as_ref().is_some_and(|folder| same(folder, scan));
+        let of = |about: &About| about.folder.as_ref().is_some_and(|folder| folder == scan);
         if self.about.as_ref().is_some_and(of) {
             return;
         }
