@@ -38,12 +38,25 @@ pub struct App {
     closes: bool,
 }
 
+/// The window cannot work.
+#[derive(Debug, thiserror::Error)]
+#[error("{}", texts::shell::no_thread(texts::shell::threads::WINDOW, .0))]
+pub struct NoThreads(std::io::Error);
+
 impl App {
     /// A window as it was when it was closed. `renderer`: where the Look room puts its textures; the window works without.
-    pub fn new(ctx: &egui::Context, renderer: Option<&RenderState>, settings: Settings) -> Self {
+    ///
+    /// # Errors
+    /// Where the system gives no threads; a sentence with the remedy.
+    pub fn new(
+        ctx: &egui::Context,
+        renderer: Option<&RenderState>,
+        settings: Settings,
+    ) -> Result<Self, NoThreads> {
+        crate::clock::start();
         theme::apply(ctx, &settings);
         look::view::install(ctx, renderer);
-        let worker = Worker::start(ctx.clone());
+        let worker = Worker::start(ctx.clone()).map_err(NoThreads)?;
         let mut desk = Desk::new(settings.clone());
         if let Some(aside) = settings.put_aside() {
             desk.tell(Problem::warning(texts::SETTINGS, texts::settings_put_aside(aside)));
@@ -56,7 +69,7 @@ impl App {
             }
             None => {}
         }
-        Self {
+        Ok(Self {
             window: Geometry::new(&settings),
             problems: Problems::default(),
             question: None,
@@ -72,7 +85,7 @@ impl App {
             look: Look::default(),
             scans: Scans::default(),
             shown: None,
-        }
+        })
     }
 
     /// What all rooms share.
@@ -125,7 +138,7 @@ impl App {
             Update::Opened(place) => {
                 desk.settings.rig = Some(place.folder.clone());
                 desk.place = Some(*place);
-                desk.held_by = None;
+                (desk.held_by, desk.is_calibrated) = (None, false);
                 desk.problems.retain(|problem| problem.area != Some(Area::Opening));
                 self.scan.reset(desk);
                 self.scans.reset(desk);
@@ -133,6 +146,11 @@ impl App {
                 self.calibrate.reset();
             }
             Update::Held(folder, holder) => self.held(&folder, holder),
+            Update::Calibrated(folder, is) => {
+                if desk.place.as_ref().is_some_and(|place| place.folder == folder) {
+                    desk.is_calibrated = is;
+                }
+            }
             Update::CalibrationAge(days) => desk.calibration_age_days = days,
             Update::Rig(told) => self.rig.hear(told, desk),
             Update::Calibrate(told) => self.calibrate.hear(told, desk),

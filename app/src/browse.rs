@@ -13,8 +13,8 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 pub struct Browse {
     /// `None` where no dialogue is open.
     answer: Option<Receiver<Answer>>,
-    /// The desktop has none, and that is being said.
-    none: bool,
+    /// There is none, and why is being said.
+    why_none: Option<String>,
 }
 
 /// What came of it.
@@ -22,8 +22,8 @@ pub struct Browse {
 enum Answer {
     Chosen(PathBuf),
     Closed,
-    /// There is nothing that could show one.
-    None,
+    /// There is nothing that could show one; what to do about it.
+    None(String),
 }
 
 impl Browse {
@@ -52,16 +52,21 @@ impl Browse {
 
     /// Where there is no dialogue: that, what would bring one, and what goes without.
     fn say_none(&mut self, button: &egui::Response) {
+        let Some(why) = &self.why_none else { return };
+        let mut open = true;
         egui::Popup::from_response(button)
-            .open_bool(&mut self.none)
+            .open_bool(&mut open)
             .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside)
             .width(320.0)
             .show(|ui| {
                 ui.horizontal_top(|ui| {
                     Sign::Warning.ui(ui);
-                    ui.add(egui::Label::new(shell::NO_DIALOGUE).wrap().selectable(true));
+                    ui.add(egui::Label::new(why).wrap().selectable(true));
                 });
             });
+        if !open {
+            self.why_none = None;
+        }
     }
 
     /// Waits for a dialogue, beside the window. `available`: whether there is one; that may take its time, too.
@@ -73,16 +78,20 @@ impl Browse {
     ) {
         let (sender, answer) = mpsc::channel();
         let ctx = ctx.clone();
-        // Without a thread there is no dialogue, as if it had been closed.
-        let _ = weavelight::machine::spawn("dialogue", move || {
+        let told = sender.clone();
+        let waits = weavelight::machine::spawn("dialogue", move || {
             let answer = match available() {
                 true => pollster::block_on(dialogue).map_or(Answer::Closed, Answer::Chosen),
-                false => Answer::None,
+                false => Answer::None(shell::NO_DIALOGUE.to_owned()),
             };
             // The window may be gone by then.
             let _ = sender.send(answer);
             ctx.request_repaint();
         });
+        if let Err(error) = waits {
+            let why = shell::no_thread(shell::threads::DIALOGUE, &error);
+            let _ = told.send(Answer::None(why));
+        }
         self.answer = Some(answer);
     }
 
@@ -95,8 +104,8 @@ impl Browse {
         match answer {
             Answer::Chosen(path) => Some(path),
             Answer::Closed => None,
-            Answer::None => {
-                self.none = true;
+            Answer::None(why) => {
+                self.why_none = Some(why);
                 None
             }
         }
@@ -175,7 +184,7 @@ mod tests {
             assert_eq!(browse.take(), None);
             std::thread::yield_now();
         }
-        assert!(browse.none);
+        assert!(browse.why_none.is_some());
         let mut window = egui_kittest::Harness::new_ui(|ui| {
             assert_eq!(browse.folder(ui), None);
         });

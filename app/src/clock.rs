@@ -2,10 +2,19 @@
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use std::sync::LazyLock;
+
+/// The system's time zone, asked for once: no frame waits for the disk.
+static SYSTEM: LazyLock<TimeZone> = LazyLock::new(TimeZone::system);
+
+/// Asks for the time zone, before the first frame.
+pub fn start() {
+    LazyLock::force(&SYSTEM);
+}
 
 /// A moment in the system's time zone.
 pub fn local(when: Timestamp) -> String {
-    in_zone(when, TimeZone::system())
+    in_zone(when, SYSTEM.clone())
 }
 
 /// A moment in a time zone; where that is not known, in UTC, which is said.

@@ -18,6 +18,8 @@ pub struct Desk {
     pub place: Option<Place>,
     /// Which other program holds it, in words: then it is looked at only.
     pub held_by: Option<String>,
+    /// Whether its lights are calibrated.
+    pub is_calibrated: bool,
     /// How old its calibration is; `None` where there is none.
     pub calibration_age_days: Option<i64>,
     /// What the worker is doing.
@@ -154,6 +156,7 @@ impl Desk {
             settings,
             place: None,
             held_by: None,
+            is_calibrated: false,
             calibration_age_days: None,
             activity: None,
             problems: Vec::new(),

@@ -2,9 +2,11 @@
 //! own, so that no frame waits for the disk.
 
 use crate::settings::Settings;
+use crate::texts::shell::{no_thread, threads};
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use weavelight::machine::spawn;
 
 /// So long nothing must have changed: a slider that is dragged changes them with every frame.
 const QUIET: Duration = Duration::from_millis(300);
@@ -24,7 +26,12 @@ impl Keeper {
     pub fn start(known: Settings) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, news) = mpsc::channel();
-        let thread = weavelight::machine::spawn("settings", move || keep(&inbox, &outbox)).ok();
+        let told = outbox.clone();
+        let thread = spawn("settings", move || keep(&inbox, &outbox));
+        let thread = thread.inspect_err(|error| {
+            let _ = told.send(Err(no_thread(threads::SETTINGS, error)));
+        });
+        let thread = thread.ok();
         Self { known, changes: Some(changes), news, thread }
     }
 

@@ -1,12 +1,25 @@
 //! The desktop app's executable; `weavelight gui` starts it.
 
+use std::process::ExitCode;
+use weavelight::files::name_settings;
+use weavelight::machine::{Quiet, correct_environment, start};
 use weavelight_app::{App, settings::Settings, texts};
 
-fn main() -> eframe::Result {
-    weavelight::machine::correct_environment();
-    weavelight::files::name_settings(texts::setting);
-    weavelight::machine::start();
+fn main() -> ExitCode {
+    correct_environment();
+    name_settings(texts::setting);
+    start();
     weavelight::files::survive_size_limits();
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", texts::shell::no_window(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> eframe::Result {
     let settings = Settings::load();
     let options = eframe::NativeOptions {
         viewport: weavelight_app::window::builder(&settings)
@@ -15,9 +28,12 @@ fn main() -> eframe::Result {
             .with_icon(weavelight_app::theme::icon()),
         ..Default::default()
     };
+    // The graphics are opened before the window's contents are made.
+    let quiet = Quiet::begin();
     let create = move |cc: &eframe::CreationContext| {
-        Ok(Box::new(App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings))
-            as Box<dyn eframe::App>)
+        drop(quiet);
+        let app = App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings)?;
+        Ok(Box::new(app) as Box<dyn eframe::App>)
     };
     eframe::run_native(texts::TITLE, options, Box::new(create))
 }

@@ -44,6 +44,13 @@ impl Place {
         self.calibration().join(weavelight::instrument::LIGHTS_FILE).exists()
     }
 
+    /// The folder of a scan, as this rig's paths are written where it is one of its scans.
+    pub fn as_ours(&self, scan: &Path) -> PathBuf {
+        let ours = scan.parent().is_some_and(|parent| same(parent, &self.scans()));
+        let name = scan.file_name().filter(|_| ours);
+        name.map_or_else(|| scan.to_owned(), |name| self.scans().join(name))
+    }
+
     /// Age of the oldest part of the calibration, days; `None` where there is none that can be read.
     pub fn calibration_age_days(&self) -> Option<i64> {
         Calibration::load(&self.calibration()).ok().as_ref().and_then(age_days)

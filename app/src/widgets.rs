@@ -56,9 +56,27 @@ pub fn struck(ui: &egui::Ui, wanted: egui::Key) -> bool {
     ui.input(|input| input.events.iter().any(is_it))
 }
 
-/// Whether Enter was pressed in a field of one line.
+/// Whether Enter was pressed in a field of one line. Nothing else gets that key then.
 pub fn entered(ui: &egui::Ui, field: &egui::Response) -> bool {
-    field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
+    let enter =
+        |input: &mut egui::InputState| input.consume_key(egui::Modifiers::NONE, egui::Key::Enter);
+    field.lost_focus() && ui.input_mut(enter)
+}
+
+/// A field for a path, `width` points wide. What was written or pasted becomes the path that it means once the field is left.
+pub fn path_field(
+    ui: &mut egui::Ui,
+    label: egui::Id,
+    text: &mut String,
+    width: f32,
+) -> egui::Response {
+    let field = ui.add(egui::TextEdit::singleline(text).desired_width(width)).labelled_by(label);
+    if field.lost_focus()
+        && let Some(path) = crate::paths::typed(text).as_deref().and_then(std::path::Path::to_str)
+    {
+        path.clone_into(text);
+    }
+    field
 }
 
 /// At the end of what scrolls: what has just got the keyboard comes into sight.

@@ -35,6 +35,10 @@ fn first_on(screen: Vec2) -> Vec2 {
 pub struct Geometry {
     /// The screen is still to be asked for the first size.
     first: bool,
+    /// It is to be maximised as it was, once it is on the screen.
+    maximizes: bool,
+    /// The number of the first frame.
+    first_frame: Option<u64>,
     size: Vec2,
     since_s: f64,
 }
@@ -52,7 +56,26 @@ struct Seen {
 impl Geometry {
     /// Begins with the settings as they were kept.
     pub fn new(settings: &Settings) -> Self {
-        Self { first: settings.window_size.is_none(), size: Vec2::ZERO, since_s: 0.0 }
+        Self {
+            first: settings.window_size.is_none(),
+            maximizes: settings.maximized,
+            first_frame: None,
+            size: Vec2::ZERO,
+            since_s: 0.0,
+        }
+    }
+
+    /// A window is created hidden and shown with its first frame. A window manager of X11 ignores that a hidden one is to be
+    /// maximised, so it is asked once more.
+    fn maximize(&mut self, ctx: &egui::Context, seen: &Seen) {
+        let frame = ctx.cumulative_frame_nr();
+        if frame <= *self.first_frame.get_or_insert(frame) {
+            return ctx.request_repaint();
+        }
+        self.maximizes = false;
+        if !seen.maximized {
+            ctx.send_viewport_cmd(ViewportCommand::Maximized(true));
+        }
     }
 
     /// Remembers size and scale; the first time, fits the window to the screen.
@@ -78,6 +101,9 @@ impl Geometry {
                 let size = first_on(screen) / scale;
                 ctx.send_viewport_cmd(ViewportCommand::InnerSize(size));
             }
+        }
+        if self.maximizes {
+            return self.maximize(ctx, &seen);
         }
         if !self.remember(&seen, settings) && real {
             // A window that nothing happens in draws no frame.

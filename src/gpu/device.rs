@@ -2,8 +2,8 @@
 
 use super::buffers::{Buffers, Flight};
 use super::pack::Packed;
-use super::quiet::Quiet;
 use super::{Adapter, GpuError, Tile};
+use crate::machine::Quiet;
 use crate::photometry::Method;
 use std::future::Future;
 use std::pin::pin;

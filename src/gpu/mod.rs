@@ -14,8 +14,6 @@ mod device;
 mod error;
 #[cfg(feature = "gpu")]
 mod pack;
-#[cfg(feature = "gpu")]
-mod quiet;
 #[cfg(test)]
 #[cfg(feature = "gpu")]
 pub(crate) mod tests;

@@ -3,8 +3,10 @@
 
 mod environment;
 mod memory;
+mod quiet;
 mod threads;
 
 pub use environment::correct_environment;
 pub use memory::{NoMemory, available_bytes, check_memory};
+pub use quiet::Quiet;
 pub use threads::{Pool, spawn, start, thread_count};

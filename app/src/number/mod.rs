@@ -1,5 +1,5 @@
-//! A field for a number: dragged, or written as people write numbers. What cannot be read stays in the field, and what is wrong
-//! with it is said beside it.
+//! A field for a number: dragged, or written as people write numbers. What cannot be read stays in the field, what is wrong
+//! with it is said beside it, and the number stays what it was before it was written.
 
 mod parse;
 
@@ -66,6 +66,11 @@ impl Number {
         let enabled = ui.is_enabled();
         let mut current = value.to_f64();
         let id = ui.scope_id().with(("number", name));
+        if ui.data(|data| data.get_temp::<Kept>(id)).is_some_and(|kept| kept.left != current) {
+            // Something else has changed it, as a slider beside it: that counts, not what was written here.
+            keep(ui, id, None);
+            ui.data_mut(|data| data.remove::<String>(id));
+        }
         let mut field = match ui.data(|data| data.get_temp::<String>(id)) {
             Some(draft) => self.draft(ui, id, draft, &mut current),
             None => self.drag(ui, id, &mut current),
@@ -74,6 +79,11 @@ impl Number {
             *value = N::from_f64(current);
             field.response.mark_changed();
         }
+        ui.data_mut(|data| {
+            if let Some(kept) = data.get_temp::<Kept>(id) {
+                data.insert_temp(id, Kept { left: value.to_f64(), ..kept });
+            }
+        });
         // What cannot be used cannot be missed.
         field.is_read |= !enabled;
         field
@@ -82,17 +92,22 @@ impl Number {
     /// As the number that it is.
     fn drag(&self, ui: &mut Ui, id: Id, value: &mut f64) -> Field {
         let before = *value;
+        // What is half written may be a number, and an empty field may be one: neither is what stood there.
+        let kept = kept(ui, id).unwrap_or(before);
+        // A field counts as just left for two frames: what was given up in the first must not be read in the second.
+        let given_up = id.with("given up");
+        let was_given_up = ui.data_mut(|data| data.remove_temp(given_up)).unwrap_or(false);
         let unread: RefCell<Option<Option<String>>> = RefCell::new(None);
         let written = RefCell::new(String::new());
         let parse = |text: &str| {
             // A field that was only visited keeps the digits that it does not show.
-            if text == *written.borrow() {
+            if was_given_up || text == *written.borrow() {
                 *unread.borrow_mut() = Some(None);
                 return Some(before);
             }
             let read = self.read(text).ok();
             *unread.borrow_mut() = Some(read.is_none().then(|| text.to_owned()));
-            read
+            Some(read.unwrap_or(kept))
         };
         let write = |value: f64, shown: RangeInclusive<usize>| {
             written.replace(self.written(value, shown));
@@ -108,6 +123,10 @@ impl Number {
             .custom_formatter(write)
             .custom_parser(parse);
         let response = ui.add(drag);
+        if gives_up(ui, &response) {
+            *value = kept;
+            ui.data_mut(|data| data.insert_temp(given_up, true));
+        }
         let live = id.with("unread");
         if let Some(found) = unread.into_inner() {
             let text = found.filter(|text| !text.trim().is_empty());
@@ -122,8 +141,9 @@ impl Number {
         if !response.has_focus() {
             ui.data_mut(|data| data.remove::<bool>(live));
         }
-        let is_kept = ui.data(|data| data.get_temp::<String>(id).is_some());
-        Field { response, is_read: !is_unread && !is_kept }
+        let is_draft = ui.data(|data| data.get_temp::<String>(id).is_some());
+        keep(ui, id, (response.has_focus() || is_draft).then_some(kept));
+        Field { response, is_read: !is_unread && !is_draft }
     }
 
     /// As the text that was written and is no number.
@@ -132,15 +152,16 @@ impl Number {
         let edit = TextEdit::singleline(&mut text).id(id.with("edit")).desired_width(width);
         let response = ui.add(edit.text_color(ui.visuals().error_fg_color));
         let read = self.read(&text);
-        if let Ok(read) = read {
-            *value = read;
-        }
-        let given_up = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Escape));
+        let kept = kept(ui, id).unwrap_or(*value);
+        let given_up = gives_up(ui, &response);
+        *value = read.ok().filter(|_| !given_up).unwrap_or(kept);
         let empty = text.trim().is_empty() && !response.has_focus();
         if given_up || empty || (read.is_ok() && !response.has_focus()) {
             ui.data_mut(|data| data.remove::<String>(id));
+            keep(ui, id, None);
             return Field { response, is_read: true };
         }
+        keep(ui, id, Some(kept));
         ui.data_mut(|data| data.insert_temp(id, text.clone()));
         if let Err(why) = read
             && ui.is_rect_visible(response.rect)
@@ -168,6 +189,33 @@ impl Number {
             None => number,
         }
     }
+}
+
+/// Of a field that is written into.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    /// The number that stood there before.
+    number: f64,
+    /// The number as the field has left it.
+    left: f64,
+}
+
+fn kept(ui: &Ui, id: Id) -> Option<f64> {
+    ui.data(|data| data.get_temp::<Kept>(id)).map(|kept| kept.number)
+}
+
+fn keep(ui: &Ui, id: Id, number: Option<f64>) {
+    ui.data_mut(|data| {
+        data.remove::<Kept>(id);
+        if let Some(number) = number {
+            data.insert_temp(id, Kept { number, left: number });
+        }
+    });
+}
+
+/// Escape leaves a field as if nothing had been written.
+fn gives_up(ui: &Ui, field: &Response) -> bool {
+    field.lost_focus() && ui.input(|input| input.key_pressed(Key::Escape))
 }
 
 /// Beside the field, where it covers no other one.

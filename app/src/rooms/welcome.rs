@@ -50,8 +50,7 @@ impl Welcome {
         ui.horizontal(|ui| {
             let label = ui.label(texts::PATH);
             let width = ui.available_width() - 190.0;
-            let field = egui::TextEdit::singleline(&mut self.path).desired_width(width.max(80.0));
-            let field = ui.add(field).labelled_by(label.id);
+            let field = widgets::path_field(ui, label.id, &mut self.path, width.max(80.0));
             let entered = widgets::entered(ui, &field);
             if let Some(folder) = self.browse.folder(ui) {
                 self.path = folder.display().to_string();

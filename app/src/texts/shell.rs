@@ -67,3 +67,34 @@ pub const HIDE: &str = "Hide";
 pub fn problems(count: usize) -> String {
     if count == 1 { "1 problem".to_owned() } else { format!("{count} problems") }
 }
+
+/// Where the system gives no thread; `what` it is for.
+pub fn no_thread(what: &str, error: &std::io::Error) -> String {
+    format!(
+        "no thread can be started {what} ({error}); close other programs or raise the limit (ulimit -u)"
+    )
+}
+
+/// What threads are for.
+pub mod threads {
+    /// The worker.
+    pub const WINDOW: &str = "for the window";
+    /// Keeping settings.
+    pub const SETTINGS: &str = "to keep the settings";
+    /// Keeping strokes.
+    pub const STROKES: &str = "to keep the strokes";
+    /// A dialogue.
+    pub const DIALOGUE: &str = "for the dialogue";
+    /// What is seen of a scan while it goes on.
+    pub const PREVIEWS: &str = "to show the scan while it goes on";
+}
+
+/// Why the window does not open.
+pub fn no_window(error: &eframe::Error) -> String {
+    match error {
+        eframe::Error::AppCreation(error) => error.to_string(),
+        error => format!(
+            "the window cannot be opened ({error}); start it from a desktop, or use the command line: weavelight --help"
+        ),
+    }
+}

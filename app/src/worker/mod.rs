@@ -17,12 +17,15 @@ use crate::desk::{Area, Problem};
 use crate::place::Place;
 use crate::rooms::{Room, calibrate, look, rig, scan, scans};
 use eframe::egui;
+use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::JoinHandle;
 use std::time::Duration;
 use weavelight::device::scan::Instruments;
+use weavelight::machine::spawn;
 
 /// What is to be done.
 #[derive(Debug)]
@@ -124,6 +127,8 @@ pub enum Update {
     Opened(Box<Place>),
     /// Which other program holds the rig in a folder, in words.
     Held(PathBuf, Option<String>),
+    /// Whether the lights of the rig in a folder are calibrated.
+    Calibrated(PathBuf, bool),
     /// How old its calibration is, days.
     CalibrationAge(Option<i64>),
     /// For the Rig room.
@@ -153,6 +158,9 @@ pub struct Tools {
     pub frames: look::Frames,
 }
 
+/// How a thread is started.
+type Spawn<'a> = dyn Fn(&str, Box<dyn FnOnce() + Send>) -> io::Result<JoinHandle<()>> + 'a;
+
 /// The worker as the window sees it.
 #[derive(Debug)]
 pub struct Worker {
@@ -167,8 +175,15 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread; it ends with this value, after what it is doing. `ctx` is woken for every update.
-    pub fn start(ctx: egui::Context) -> Self {
+    /// Starts the threads; they end with this value, after what they are doing. `ctx` is woken for every update.
+    ///
+    /// # Errors
+    /// Where the system gives no thread: nothing works without.
+    pub fn start(ctx: egui::Context) -> io::Result<Self> {
+        Self::start_with(ctx, &|name, work| spawn(name, work))
+    }
+
+    fn start_with(ctx: egui::Context, spawn: &Spawn<'_>) -> io::Result<Self> {
         let (commands, inbox) = mpsc::channel();
         let (readings, to_read) = mpsc::channel();
         let (outbox, updates) = mpsc::channel();
@@ -176,14 +191,15 @@ impl Worker {
         let out = Outbox::new(outbox, ctx, brake.clone());
         let open = Arc::new(AtomicUsize::new(0));
         let (reader, read) = (out.clone(), open.clone());
-        std::thread::spawn(move || {
+        let reads = move || {
             for command in to_read {
                 act(command, &mut Tools::default(), &reader);
                 read.fetch_sub(1, Ordering::SeqCst);
             }
-        });
+        };
+        spawn("reader", Box::new(reads))?;
         let done = open.clone();
-        std::thread::spawn(move || {
+        let works = move || {
             let mut tools = Tools::default();
             for command in inbox {
                 if !out.is_closing() {
@@ -192,8 +208,9 @@ impl Worker {
                 }
                 done.fetch_sub(1, Ordering::SeqCst);
             }
-        });
-        Self { commands, readings, updates, open, brake }
+        };
+        spawn("worker", Box::new(works))?;
+        Ok(Self { commands, readings, updates, open, brake })
     }
 
     /// Hands over a command.
@@ -227,5 +244,34 @@ fn act(command: Command, tools: &mut Tools, out: &Outbox) {
         Command::Scan(ask) => scan::act(ask, tools, out),
         Command::Look(ask) => look::act(ask, tools, out),
         Command::Scans(ask) => scans::act(ask, tools, out),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::Cell;
+
+    /// Whichever thread is refused, that is an error, and the other one ends.
+    #[test]
+    fn a_window_without_threads_is_an_error() {
+        for refused in 0..2 {
+            let (asked, started) = (Cell::new(0), Cell::new(None));
+            let give = |name: &str, work: Box<dyn FnOnce() + Send>| {
+                if asked.replace(asked.get() + 1) == refused {
+                    return Err(io::ErrorKind::WouldBlock.into());
+                }
+                let thread = spawn(name, work)?;
+                let (ended, end) = mpsc::channel();
+                let waits = spawn("waits", move || ended.send(thread.join().is_ok()).unwrap_or(()));
+                started.set(Some(end));
+                waits
+            };
+            let error = Worker::start_with(egui::Context::default(), &give).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
+            if let Some(end) = started.take() {
+                assert_eq!(end.recv_timeout(Duration::from_secs(60)), Ok(true));
+            }
+        }
     }
 }

@@ -19,11 +19,12 @@ pub(crate) fn open(folder: &Path, tools: &mut Tools, out: &Outbox) {
             tools.instruments = None;
             tools.place = Some(place.clone());
             tools.watch = None;
-            let (folder, rig_file) = (place.folder.clone(), place.rig_file());
-            let age_days = place.calibration_age_days();
-            out.tell(Update::Opened(Box::new(place)));
+            let folder = place.folder.clone();
+            let (age_days, is_calibrated) = (place.calibration_age_days(), place.is_calibrated());
+            out.tell(Update::Opened(Box::new(place.clone())));
+            out.tell(Update::Calibrated(folder.clone(), is_calibrated));
             out.tell(Update::CalibrationAge(age_days));
-            tools.watch = Some(Watch::start(folder, rig_file, out.clone()));
+            tools.watch = Some(Watch::start(&place, out.clone()));
         }
         Err(error) => out.fail(texts::OPENING, &error),
     }

@@ -1,7 +1,9 @@
-//! Whether another program holds the rig: then this window only looks, and takes over when it is free.
+//! What others do to the rig: whether another program holds it - then this window only looks, and takes over when it is free -
+//! and whether it is calibrated.
 
 use super::{Outbox, Update};
-use std::path::{Path, PathBuf};
+use crate::place::Place;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -18,18 +20,23 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Looks at the lock of the rig in `folder`, and tells when its holder changes.
-    pub(super) fn start(folder: PathBuf, rig_file: PathBuf, out: Outbox) -> Self {
+    /// Looks at the lock of a rig, and tells when its holder changes; and at the calibration.
+    pub(super) fn start(place: &Place, out: Outbox) -> Self {
+        let (place, rig_file, folder) = (place.clone(), place.rig_file(), place.folder.clone());
         let ended = Arc::new(AtomicBool::new(false));
         let end = ended.clone();
         // Without a thread nothing is watched, and the lock itself still holds.
         let _ = spawn("watch", move || {
-            let mut last = None;
+            let (mut last, mut was_calibrated) = (None, None);
             while !end.load(Ordering::SeqCst) {
                 let holder = holder(&rig_file);
                 if last != holder {
                     last.clone_from(&holder);
                     out.tell(Update::Held(folder.clone(), holder));
+                }
+                let is_calibrated = place.is_calibrated();
+                if was_calibrated.replace(is_calibrated) != Some(is_calibrated) {
+                    out.tell(Update::Calibrated(folder.clone(), is_calibrated));
                 }
                 std::thread::sleep(INTERVAL);
             }

@@ -14,8 +14,8 @@ use weavelight_app::{App, rooms::Room, settings::Settings, worker::Command};
 pub(crate) const WIDE: [f32; 2] = [1280.0, 800.0];
 /// A small laptop's.
 pub(crate) const SMALL: [f32; 2] = [960.0, 640.0];
-/// Work on small frames takes seconds; on a machine with much else to do, longer.
-const PATIENCE: Duration = Duration::from_secs(240);
+/// So long nothing may be heard of work that is waited for. A calibration takes more than a minute, but it tells how far it is.
+const PATIENCE: Duration = Duration::from_secs(60);
 /// Small enough for a test, large enough for a calibrated camera.
 const FRAME: [usize; 2] = [96, 64];
 
@@ -39,12 +39,16 @@ impl Window {
             egui::Theme::Light => weavelight_app::settings::Theme::Light,
         };
         change(&mut settings);
+        let quiet = weavelight::machine::Quiet::begin();
         let harness = Harness::builder()
             .with_size(size)
             .with_theme(theme)
             .with_max_steps(64)
             .wgpu()
-            .build_eframe(|cc| App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings));
+            .build_eframe(|cc| {
+                App::new(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), settings).unwrap()
+            });
+        drop(quiet);
         Self { harness, home }
     }
 
@@ -116,23 +120,30 @@ impl Window {
 
     /// Waits for something with this name.
     pub(crate) fn until_label(&mut self, label: &str) {
-        let begun = Instant::now();
-        while self.harness.query_by_label(label).is_none() {
-            assert!(begun.elapsed() < PATIENCE, "no {label:?}; {:?}", self.harness.state().desk());
+        self.wait_for(label, |window| window.harness.query_by_label(label).is_some());
+    }
+
+    pub(crate) fn until(&mut self, what: &str, happened: impl Fn(&App) -> bool) {
+        self.wait_for(what, |window| happened(window.harness.state()));
+    }
+
+    fn wait_for(&mut self, what: &str, happened: impl Fn(&Self) -> bool) {
+        let (mut heard, mut since) = (self.news(), Instant::now());
+        while !happened(self) {
+            let news = self.news();
+            if news != heard {
+                (heard, since) = (news, Instant::now());
+            }
+            let desk = self.harness.state().desk();
+            assert!(since.elapsed() < PATIENCE, "{what}: not yet; {desk:?}");
             self.wait();
         }
     }
 
-    pub(crate) fn until(&mut self, what: &str, happened: impl Fn(&App) -> bool) {
-        let begun = Instant::now();
-        while !happened(self.harness.state()) {
-            assert!(
-                begun.elapsed() < PATIENCE,
-                "{what}: not yet; {:?}",
-                self.harness.state().desk()
-            );
-            self.wait();
-        }
+    /// What is known of the work under way.
+    fn news(&self) -> Option<(String, String, f64)> {
+        let activity = self.harness.state().desk().activity.as_ref()?;
+        Some((activity.title.clone(), activity.step.clone(), activity.share))
     }
 
     /// Until the worker has nothing left to do and nothing moves.

@@ -108,10 +108,12 @@ impl Bench {
             egui::Theme::Light => weavelight_app::settings::Theme::Light,
         };
         let builder = Harness::builder().with_size(size).with_theme(theme).with_max_steps(64);
+        let quiet = weavelight::machine::Quiet::begin();
         let mut window = builder.with_render_cursor(false).wgpu().build_eframe(move |cc| {
             let renderer = cc.wgpu_render_state.as_ref().filter(|_| graphics);
-            App::new(&cc.egui_ctx, renderer, settings)
+            App::new(&cc.egui_ctx, renderer, settings).unwrap()
         });
+        drop(quiet);
         wait(&mut window, "the rig", |window| window.state().desk().place.is_some());
         window.run();
         window

@@ -44,11 +44,13 @@ fn screen_of(appearance: Appearance) -> impl Fn(usize, usize) -> [i32; 3] {
     let mut view = MapView::default();
     view.go_to(Viewport { centre: SIZE.map(|c| c as f64 / 2.0), zoom: ZOOM });
     let size = SIZE.map(|c| c as f32 * ZOOM);
+    let quiet = weavelight::machine::Quiet::begin();
     let builder = Harness::builder().with_size(size).with_render_cursor(false).wgpu();
     let mut window = builder.build_eframe(move |cc| {
         install(&cc.egui_ctx, cc.wgpu_render_state.as_ref());
         Bare { view, maps, appearance }
     });
+    drop(quiet);
     window.run();
     let picture = window.render().unwrap();
     move |x, y| {

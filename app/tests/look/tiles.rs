@@ -23,6 +23,7 @@ fn window() -> Harness<'static, Bare> {
     let mut view = MapView::default();
     view.go_to(Viewport { centre: SIZE.map(|c| c as f64 / 2.0), zoom: 1.0 });
     let size = SIZE.map(|c| c as f32);
+    let _quiet = weavelight::machine::Quiet::begin();
     Harness::builder().with_size(size).with_render_cursor(false).wgpu().build_eframe(move |cc| {
         install(&cc.egui_ctx, cc.wgpu_render_state.as_ref());
         Bare { view, maps, appearance: Appearance::of(Mode::Albedo) }

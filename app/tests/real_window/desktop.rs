@@ -1,6 +1,6 @@
 //! A display without a screen, and what is needed on it.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -44,17 +44,22 @@ impl Desktop {
         self.home.path()
     }
 
+    /// The program, to be started on this display.
+    pub(crate) fn app(&self) -> Command {
+        let mut app = self.program(env!("CARGO_BIN_EXE_weavelight-app"));
+        app.env("XDG_CONFIG_HOME", self.home().join("config"));
+        app.env("XDG_RUNTIME_DIR", self.home());
+        app
+    }
+
     pub(crate) fn open(&mut self) {
-        let app = Command::new(env!("CARGO_BIN_EXE_weavelight-app"))
-            .env("DISPLAY", &self.display)
-            .env_remove("WAYLAND_DISPLAY")
-            .env("HOME", self.home())
-            .env("XDG_CONFIG_HOME", self.home().join("config"))
-            .env("XDG_RUNTIME_DIR", self.home())
-            .stdin(Stdio::null())
-            .spawn()
-            .unwrap();
-        self.app = Some(app);
+        let app = self.app();
+        self.open_as(app);
+    }
+
+    /// Opens the window of this command.
+    pub(crate) fn open_as(&mut self, mut app: Command) {
+        self.app = Some(app.spawn().unwrap());
         self.xdotool(&[
             "search",
             "--sync",
@@ -168,9 +173,19 @@ impl Desktop {
 
     /// So it does, as something else has told it to.
     pub(crate) fn has_left(&mut self) {
+        self.left();
+    }
+
+    /// The same; what it has printed to its standard error stream where that is piped.
+    pub(crate) fn left(&mut self) -> String {
         let mut app = self.app.take().unwrap();
         let status = until("the program has left", || app.try_wait().unwrap());
         assert!(status.success(), "{status}");
+        let mut said = String::new();
+        if let Some(mut stderr) = app.stderr.take() {
+            stderr.read_to_string(&mut said).unwrap();
+        }
+        said
     }
 }
 

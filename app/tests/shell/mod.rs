@@ -2,6 +2,7 @@
 
 mod fields;
 mod leaving;
+mod tabs;
 
 use super::desk::{self, Window};
 use eframe::egui::{self, Key, Rect};

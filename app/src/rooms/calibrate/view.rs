@@ -8,7 +8,7 @@ use crate::number::{Number, Unit};
 use crate::place::Place;
 use crate::texts::calibrate as texts;
 use crate::theme::{self, meaning};
-use crate::widgets::Sign;
+use crate::widgets::{self, Sign};
 use eframe::egui::emath::Numeric;
 use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
 use std::path::Path;
@@ -249,8 +249,9 @@ pub(super) fn targets(
         }
         Task::Chart => {
             let label = ui.label(texts::CHART);
-            let edit = egui::TextEdit::singleline(&mut targets.chart).desired_width(280.0);
-            ui.add(edit).labelled_by(label.id).on_hover_text(texts::CHART_HINT);
+            let field = widgets::path_field(ui, label.id, &mut targets.chart, 280.0);
+            // The keyboard is given back, so that Space takes the picture.
+            widgets::entered(ui, &field.on_hover_text(texts::CHART_HINT));
             if let Some(file) = browse.file(ui) {
                 targets.chart = file.display().to_string();
             }

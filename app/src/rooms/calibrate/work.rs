@@ -54,6 +54,7 @@ pub(super) fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
         out.tell(Update::Calibrate(Told::Halted(ended)));
     }
     let state = out.job(texts::LOOKING, || state(&place, &mut tools.calibrate, out));
+    out.tell(Update::Calibrated(place.folder.clone(), place.is_calibrated()));
     out.tell(Update::Calibrate(match state {
         Ok(state) => Told::State(Box::new(state)),
         Err(ended) => Told::Halted(ended),
@@ -134,10 +135,9 @@ fn subject(
         Task::Chart => {
             let patches = if simulated {
                 target.patches
-            } else if settings.chart.trim().is_empty() {
-                return Err(texts::NO_CHART.into());
             } else {
-                Target::load(Path::new(settings.chart.trim()))?.patches
+                let chart = crate::paths::typed(&settings.chart).ok_or(texts::NO_CHART)?;
+                Target::load(&chart)?.patches
             };
             (Subject::Grey { patches }, None)
         }

@@ -2,6 +2,7 @@
 //! window is open, as a picture in the user's configuration folder after that.
 
 use super::Painting;
+use crate::texts::shell::{no_thread, threads};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -103,7 +104,12 @@ impl Writer {
     fn start(folder: PathBuf) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, troubles) = mpsc::channel();
-        let thread = spawn("drafts", move || write_all(&inbox, &outbox)).ok();
+        let told = outbox.clone();
+        let thread = spawn("drafts", move || write_all(&inbox, &outbox));
+        let thread = thread.inspect_err(|error| {
+            let _ = told.send(no_thread(threads::STROKES, error));
+        });
+        let thread = thread.ok();
         Self { folder, changes: Some(changes), troubles, thread }
     }
 }

@@ -287,8 +287,7 @@ impl Look {
         ui.horizontal(|ui| {
             let label = ui.label(name);
             let width = (ui.available_width() - 160.0).max(60.0);
-            let field = egui::TextEdit::singleline(&mut self.path).desired_width(width);
-            let field = ui.add(field).labelled_by(label.id);
+            let field = widgets::path_field(ui, label.id, &mut self.path, width);
             if std::mem::take(&mut self.path_is_next) {
                 field.request_focus();
             }

@@ -5,6 +5,7 @@ use super::Told;
 use super::picture::{Thumb, thumb};
 use crate::place::Place;
 use crate::rooms::look::view::{Geometry, Maps};
+use crate::texts::shell::{no_thread, threads};
 use crate::worker::{Outbox, Update};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, Sender};
@@ -43,8 +44,13 @@ impl Eyes {
     pub(super) fn open(place: &Place, folder: &Path, out: &Outbox) -> Self {
         let (sights, inbox) = mpsc::channel();
         let (place, folder, out) = (place.clone(), folder.to_owned(), out.clone());
+        let told = out.clone();
+        let thread = spawn("previews", move || watch(&inbox, &place, &folder, &out));
         // Without a thread there are no previews; the scan goes on.
-        let thread = spawn("previews", move || watch(&inbox, &place, &folder, &out)).ok();
+        let thread = thread.inspect_err(|error| {
+            told.warn(crate::texts::rooms::SCAN, &[no_thread(threads::PREVIEWS, error)]);
+        });
+        let thread = thread.ok();
         Self { sights: Some(sights), thread }
     }
 

@@ -4,7 +4,6 @@ use super::{Ask, Order, What};
 use crate::desk::Desk;
 use crate::names::Taken;
 use crate::number::{Number, Unit};
-use crate::place::Place;
 use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
 use crate::worker::Command;
 use crate::{texts::scan as texts, theme, widgets};
@@ -88,11 +87,13 @@ pub(super) struct Form {
     fabric: Preset,
     /// A number cannot be read: nothing is scanned with another one in its place.
     unread: bool,
+    /// So it is with the test shot's light.
+    unread_light: bool,
 }
 
 impl Default for Form {
     fn default() -> Self {
-        Self { test_light: 0, fabric: Preset::Linen, unread: false }
+        Self { test_light: 0, fabric: Preset::Linen, unread: false, unread_light: false }
     }
 }
 
@@ -140,14 +141,17 @@ impl Form {
     fn test(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         let lights = desk.place.as_ref().map_or(0, |place| place.rig.lights.len());
         ui.horizontal(|ui| {
+            let can = desk.can_change() && !self.unread && !self.unread_light;
             let clicked = ui
-                .add_enabled(desk.can_change(), egui::Button::new(texts::TEST_SHOT))
+                .add_enabled(can, egui::Button::new(texts::TEST_SHOT))
                 .on_hover_text(texts::TEST_SHOT_HINT)
                 .clicked();
             let label = ui.label(texts::LIGHT);
             let most = lights.saturating_sub(1);
             let light = Number::of(Unit::Count, 0.0..=most as f64).speed(0.05);
-            light.show(ui, texts::LIGHT, &mut self.test_light).response.labelled_by(label.id);
+            let light = light.show(ui, texts::LIGHT, &mut self.test_light);
+            light.response.labelled_by(label.id);
+            self.unread_light = !light.is_read;
             if clicked {
                 let FormSettings { exposure_s, iso, .. } = desk.settings.scan;
                 let settings = Settings { exposure_s, iso };
@@ -161,9 +165,8 @@ impl Form {
     pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk, done: bool) -> bool {
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
         let text = if done { texts::NEXT } else { texts::SCAN };
-        let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
         // Without a calibration the room is about getting one.
-        let button = match calibrated {
+        let button = match desk.is_calibrated {
             true => widgets::primary(ui, text, size, self.can_go(desk, done)),
             false => widgets::large(ui, text, size, self.can_go(desk, done)),
         };

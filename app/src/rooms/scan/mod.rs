@@ -18,7 +18,6 @@ pub use work::SolvedScan;
 
 use crate::desk::Desk;
 use crate::names::Taken;
-use crate::place::{Place, same};
 use crate::rooms::scans::{Deleted, Unfinished};
 use crate::rooms::{Room, look};
 use crate::settings::SolveSettings;
@@ -192,8 +191,7 @@ impl Scan {
         });
         egui::CentralPanel::default().show(ui, |ui| {
             self.result(ui, desk);
-            let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
-            match (self.is_running(), calibrated) {
+            match (self.is_running(), desk.is_calibrated) {
                 (false, false) => self.ask_to_calibrate(ui, desk),
                 (true, true) => self.view.ui(ui, texts::MAPS_COME),
                 (true, false) => self.view.ui(ui, texts::NO_MAPS),
@@ -215,6 +213,18 @@ impl Scan {
     /// The form, and below it, whatever else there is, what the room is about.
     fn left(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
         let running = self.is_running();
+        // The form first, so that Tab goes through it before it comes to the button.
+        let mut above = ui.available_rect_before_wrap();
+        above.max.y -= form::BUTTON_HEIGHT;
+        let mut form = ui.new_child(egui::UiBuilder::new().id_salt("scan form").max_rect(above));
+        egui::ScrollArea::vertical().show(&mut form, |ui| {
+            ui.heading(crate::texts::rooms::SCAN);
+            self.offer_unfinished(ui, desk);
+            self.offer_undo(ui, desk);
+            tell_expired(ui, desk);
+            ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
+            widgets::reveal_focus(ui);
+        });
         egui::Panel::bottom("scan buttons").exact_size(form::BUTTON_HEIGHT).show(ui, |ui| {
             ui.add_space(theme::GAP);
             let known = !self.buttons.are_new(ui, running);
@@ -224,16 +234,6 @@ impl Scan {
                 } else if self.form.button(ui, desk, self.is_done(desk)) {
                     self.go(desk);
                 }
-            });
-        });
-        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| {
-                ui.heading(crate::texts::rooms::SCAN);
-                self.offer_unfinished(ui, desk);
-                self.offer_undo(ui, desk);
-                tell_expired(ui, desk);
-                ui.add_enabled_ui(!running, |ui| self.form.ui(ui, desk));
-                widgets::reveal_focus(ui);
             });
         });
     }
@@ -406,7 +406,7 @@ impl Scan {
 
     /// A scan that was solved is the one that is shown; nothing of another one stays beside it.
     fn turn_to(&mut self, scan: &Path) {
-        let of = |about: &About| about.folder.as_ref().is_some_and(|folder| same(folder, scan));
+        let of = |about: &About| about.folder.as_ref().is_some_and(|folder| folder == scan);
         if self.about.as_ref().is_some_and(of) {
             return;
         }

@@ -4,7 +4,7 @@ use super::again::Swapped;
 use super::form::order;
 use super::{About, Ask, Order, Scan, Stage, What};
 use crate::desk::Desk;
-use crate::place::{Place, same};
+use crate::place::Place;
 use crate::worker::Command;
 use crate::{texts::scan as texts, theme, widgets};
 use eframe::egui::{self, RichText};
@@ -41,7 +41,7 @@ impl Scan {
             return;
         }
         let folder = self.about.as_ref().and_then(|about| about.folder.clone());
-        let calibrated = desk.place.as_ref().is_some_and(Place::is_calibrated);
+        let calibrated = desk.is_calibrated;
         if let (Stage::Scanned(_), Some(scan), true) = (&self.stage, folder, calibrated)
             && ui.button(texts::SOLVE).clicked()
         {
@@ -60,7 +60,7 @@ impl Scan {
     fn again(&self, desk: &Desk) -> Option<Order> {
         let About { name, folder, order: taken } = self.about.as_ref()?;
         let scan: PathBuf = folder.clone()?;
-        let ours = |place: &Place| scan.parent().is_some_and(|parent| same(parent, &place.scans()));
+        let ours = |place: &Place| scan.parent() == Some(&place.scans());
         if !desk.place.as_ref().is_some_and(ours) {
             return None;
         }

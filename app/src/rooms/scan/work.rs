@@ -185,6 +185,7 @@ fn hear(event: &Event, eyes: &Eyes, out: &Outbox) {
 /// Of the scan that this room is about; the Look room follows.
 fn solve_here(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) {
     let how = (settings, Reuse::IfCurrent);
+    let scan = &tools.place.as_ref().map_or_else(|| scan.to_owned(), |place| place.as_ours(scan));
     let Some(SolvedScan { solution, report, expected_deg, .. }) = solve(scan, how, tools, out)
     else {
         return;

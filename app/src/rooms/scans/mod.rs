@@ -12,7 +12,7 @@ use crate::place::Place;
 use crate::rooms::Room;
 use crate::settings::SolveSettings;
 use crate::worker::{Command, Outbox, Tools};
-use crate::{texts::scans as texts, theme, widgets};
+use crate::{paths, texts::scans as texts, theme, widgets};
 use eframe::egui::{
     self, ColorImage, Key, Modifiers, RichText, Sense, TextureHandle, TextureOptions, vec2,
 };
@@ -159,6 +159,7 @@ impl Scans {
                 ui.spacing_mut().item_spacing = vec2(theme::WIDE_GAP, theme::WIDE_GAP);
                 found.iter().for_each(|entry| self.card(ui, entry, desk));
             });
+            widgets::reveal_focus(ui);
         });
     }
 
@@ -352,14 +353,18 @@ impl Scans {
             self.export_to = export_folder(entry, desk).display().to_string();
         }
         let label = ui.label(texts::EXPORT_TO);
-        let field = egui::TextEdit::singleline(&mut self.export_to).desired_width(f32::INFINITY);
-        ui.add(field).labelled_by(label.id);
+        let width = ui.available_width();
+        let field = widgets::path_field(ui, label.id, &mut self.export_to, width);
+        let entered = widgets::entered(ui, &field);
         ui.horizontal(|ui| {
             if let Some(folder) = self.browse.folder(ui) {
                 self.export_to = folder.join(export_name(entry)).display().to_string();
             }
-            if ui.add_enabled(!desk.is_busy(), egui::Button::new(texts::EXPORT)).clicked() {
-                let (solution, to) = (solution.to_owned(), PathBuf::from(self.export_to.trim()));
+            let free = !desk.is_busy();
+            let clicked = ui.add_enabled(free, egui::Button::new(texts::EXPORT)).clicked();
+            let to = paths::typed(&self.export_to).filter(|_| clicked || (entered && free));
+            if let Some(to) = to {
+                let solution = solution.to_owned();
                 desk.ask(Command::Scans(Ask::Export { solution, to }));
             }
         });

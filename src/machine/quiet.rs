@@ -1,15 +1,17 @@
 //! What drivers print is not for users of a program that found another way.
 
 #[cfg(unix)]
-pub(super) use unix::Quiet;
+pub use unix::Quiet;
 
 /// Elsewhere nothing of the kind is known.
 #[cfg(not(unix))]
-pub(super) struct Quiet;
+#[derive(Debug)]
+pub struct Quiet;
 
 #[cfg(not(unix))]
 impl Quiet {
-    pub(super) fn begin() -> Option<Self> {
+    /// Nothing is held back.
+    pub fn begin() -> Option<Self> {
         None
     }
 }
@@ -20,32 +22,62 @@ mod unix {
     use std::io::{Read, Seek, Write};
     use std::os::fd::OwnedFd;
     use std::path::Path;
+    use std::sync::{Mutex, PoisonError};
 
     /// Holds the standard error stream back while it lives, and then passes it on without the one line that Mesa's device
     /// selection has libwayland print where there is no desktop: "error: XDG_RUNTIME_DIR is invalid or not set in the
-    /// environment." Setting the variable instead is unsound while threads run.
-    pub(in super::super) struct Quiet {
+    /// environment." Setting the variable instead is unsound while threads run. Of several that live at once, the last one
+    /// passes it on.
+    #[derive(Debug)]
+    pub struct Quiet(());
+
+    struct Held {
+        /// How many want it.
+        count: usize,
         stderr: OwnedFd,
         held_back: File,
     }
 
+    static HELD: Mutex<Option<Held>> = Mutex::new(None);
+
     impl Quiet {
         /// `None` where the line is not to be expected, or the stream cannot be held back.
-        pub(in super::super) fn begin() -> Option<Self> {
+        pub fn begin() -> Option<Self> {
             let folder = std::env::var_os("XDG_RUNTIME_DIR").unwrap_or_default();
             if Path::new(&folder).is_absolute() {
                 return None;
             }
-            let held_back = tempfile::tempfile().ok()?;
-            let stderr = rustix::io::dup(rustix::stdio::stderr()).ok()?;
-            rustix::stdio::dup2_stderr(&held_back).ok()?;
-            Some(Self { stderr, held_back })
+            let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+            match held.as_mut() {
+                Some(held) => held.count += 1,
+                None => *held = Some(Held::begin()?),
+            }
+            Some(Self(()))
         }
     }
 
     impl Drop for Quiet {
         fn drop(&mut self) {
-            // What cannot be put back or passed on is only a message of a driver.
+            let mut held = HELD.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(inner) = held.as_mut() {
+                inner.count -= 1;
+            }
+            if let Some(done) = held.take_if(|held| held.count == 0) {
+                done.pass_on();
+            }
+        }
+    }
+
+    impl Held {
+        fn begin() -> Option<Self> {
+            let held_back = tempfile::tempfile().ok()?;
+            let stderr = rustix::io::dup(rustix::stdio::stderr()).ok()?;
+            rustix::stdio::dup2_stderr(&held_back).ok()?;
+            Some(Self { count: 1, stderr, held_back })
+        }
+
+        /// What cannot be put back or passed on is only a message of a driver.
+        fn pass_on(mut self) {
             let _ = rustix::stdio::dup2_stderr(&self.stderr);
             let mut said = vec![];
             let read = self.held_back.rewind().and_then(|()| self.held_back.read_to_end(&mut said));
