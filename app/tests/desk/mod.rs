@@ -15,7 +15,7 @@ pub(crate) const WIDE: [f32; 2] = [1280.0, 800.0];
 /// A small laptop's.
 pub(crate) const SMALL: [f32; 2] = [960.0, 640.0];
 /// So long nothing may be heard of work that is waited for. A calibration takes more than a minute, but it tells how far it is.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(120);
 /// Small enough for a test, large enough for a calibrated camera.
 const FRAME: [usize; 2] = [96, 64];
 
