@@ -13,6 +13,7 @@ use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, Color, DEFECTS_FILE, Defects, Noise, Optics, Rig,
     write_color, write_defects,
 };
+use crate::raw::Ceiling;
 use crate::session::{Kind, Patch, Session};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -75,6 +76,8 @@ pub(super) struct Chart {
     fingerprints: Vec<u64>,
     /// Where a file's exposure is not the manifest's.
     other_exposure: Option<String>,
+    /// Where the pictures clip, if that is below the files' full scale.
+    ceiling: Option<Ceiling>,
 }
 
 /// Calibrates levels, response, noise and colour and writes `color.toml` and `defects.toml`.
@@ -94,6 +97,7 @@ pub fn color(options: &ColorOptions, progress: &Progress) -> Result<ColorReport,
     inputs::no_copies(&chart.session, &chart.fingerprints)?;
     let mut warnings = other_optics(&chart, before.as_ref());
     warnings.extend(chart.other_exposure.clone());
+    warnings.extend(chart.ceiling.map(|ceiling| ceiling.sentence()));
     let (black, black_from) = black_level(&chart);
     let mut color = Color {
         black_level: Some(black),
@@ -213,7 +217,7 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
         ));
     }
     progress(0.1, "reading the chart");
-    let ChartFrames { frames, defects, fingerprints, other_exposure } =
+    let ChartFrames { frames, defects, fingerprints, other_exposure, ceiling } =
         read_chart(&session, &patches)?;
     let size = [rig.camera.width_px, rig.camera.height_px];
     if let Some(k) = frames.iter().position(|frame| frame.size != size) {
@@ -226,7 +230,7 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
         });
     }
     let lights = rig.lights.len();
-    Ok(Chart { session, patches, frames, defects, lights, fingerprints, other_exposure })
+    Ok(Chart { session, patches, frames, defects, lights, fingerprints, other_exposure, ceiling })
 }
 
 fn levels(chart: &Chart, color: &Color) -> Levels {

@@ -32,6 +32,8 @@ pub(super) fn check_size(
 pub(super) struct Levels {
     pub(super) black: [f64; 4],
     pub(super) saturation: [f64; 4],
+    /// Raw number from which samples are clipped below the end of the range; infinite where they are not.
+    clip: f64,
     response: Vec<f64>,
 }
 
@@ -41,11 +43,12 @@ impl Levels {
         let black = color.black_level.unwrap_or(frame.black.map(f64::from));
         let stated =
             color.saturation_level.map_or(frame.saturation.map(f64::from), |level| [level; 4]);
-        Self { black, saturation: stated, response: color.response.clone() }
+        let clip = color.clip_level.unwrap_or(f64::INFINITY);
+        Self { black, saturation: stated, clip, response: color.response.clone() }
     }
 
     pub(super) fn from_parts(black: [f64; 4], saturation: [f64; 4], response: Vec<f64>) -> Self {
-        Self { black, saturation, response }
+        Self { black, saturation, clip: f64::INFINITY, response }
     }
 
     pub(super) fn range(&self, place: usize) -> f64 {
@@ -53,9 +56,14 @@ impl Levels {
         if range.is_finite() { range } else { 1.0 }
     }
 
+    /// Share of the range, before the response curve, that is left below the clipping.
+    pub(super) fn usable_share(&self) -> f64 {
+        (0..4).map(|place| (self.clip - self.black[place]) / self.range(place)).fold(1.0, f64::min)
+    }
+
     /// Light as a fraction of full scale of a raw number; `None` where it is saturated.
     pub(super) fn linear(&self, raw: f64, place: usize) -> Option<f64> {
-        let usable = raw.is_finite() && raw < self.saturation[place];
+        let usable = raw.is_finite() && raw < self.saturation[place].min(self.clip);
         usable.then(|| self.bent((raw - self.black[place]) / self.range(place)))
     }
 

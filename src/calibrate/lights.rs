@@ -3,9 +3,9 @@
 use super::inputs::{check_out, load_all, no_copied_sessions};
 use super::sheet::{Known, Observed, observe, tilt_and_height};
 use super::{CalibrateError, Inputs, Progress, plausible};
-use crate::files::{Input, Provenance, begin_owned, check_output_folder, sha256_of_file};
+use crate::files::{Input, Owned, Provenance, begin_owned, check_output_folder, sha256_of_file};
 use crate::instrument::{
-    CAMERA_FILE, CalibratedLight, Calibration, LIGHTS_FILE, Noise, Rig, RigLightPlace,
+    CAMERA_FILE, COLOR_FILE, CalibratedLight, Calibration, LIGHTS_FILE, Noise, Rig, RigLightPlace,
     update_color, write_lights,
 };
 use crate::session::Kind;
@@ -167,7 +167,7 @@ pub fn lights(
     let provenance = Provenance::of_this_program(Some(jiff::Timestamp::now()), inputs, quality);
     progress(0.95, "writing");
     write_lights(&options.out, &calibrated, &provenance)?;
-    note_kappa(&options.out, &calibration, fitted.slow_error_rms)?;
+    report.warnings.extend(note_kappa(&options.out, &calibration, fitted.slow_error_rms)?);
     progress(1.0, "done");
     Ok(report)
 }
@@ -371,18 +371,31 @@ fn quality(report: &LightsReport, sheets: &[Sheet], priors: &[Prior]) -> toml::T
     table
 }
 
-/// What the light model leaves over is part of the noise that a solve weighs by.
-fn note_kappa(out: &Path, calibration: &Calibration, kappa: f64) -> Result<(), CalibrateError> {
+/// What the light model leaves over is part of the noise that a solve weighs by: `color.toml` has it in its noise. Says where
+/// that file was edited, and so stays as it is.
+fn note_kappa(
+    out: &Path,
+    calibration: &Calibration,
+    kappa: f64,
+) -> Result<Option<String>, CalibrateError> {
     let (Some(noise), Some(provenance)) = (calibration.color.noise, &calibration.provenance.color)
     else {
-        return Ok(());
+        return Ok(None);
     };
     let color = crate::instrument::Color {
         noise: Some(Noise { kappa, ..noise }),
         ..calibration.color.clone()
     };
-    update_color(out, &color, provenance)?;
-    Ok(())
+    let edited = update_color(out, &color, provenance)? == Owned::NotOurs;
+    let path = out.join(COLOR_FILE);
+    let tell = || {
+        format!(
+            "{} was edited and stays as it is; these sheets give kappa = {kappa:.6} in its [noise], not {:.6}",
+            path.display(),
+            noise.kappa
+        )
+    };
+    Ok(edited.then(tell))
 }
 
 /// The camera that a rig file describes, looking straight down: good enough for shading a chart.

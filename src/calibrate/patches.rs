@@ -5,7 +5,7 @@ use super::defective;
 use super::frames::{Levels, raw_at, seconds_at_iso_100};
 use super::inputs::{exposure_warning, fingerprint};
 use crate::instrument::Defects;
-use crate::raw::{Frame, Layout, Metadata};
+use crate::raw::{Ceiling, Frame, Histogram, Layout, Metadata};
 use crate::session::{FrameEntry, Patch, Session};
 use rayon::prelude::*;
 use weavelight_calibration::description::Cfa;
@@ -28,7 +28,7 @@ pub(super) struct ChartFrame {
     pub(super) exposure: f64,
     pub(super) patches: Vec<PatchStats>,
     pub(super) cfa: Cfa,
-    /// The file's own levels.
+    /// The file's own levels; saturation no higher than where the chart's pictures clip.
     pub(super) black: [f32; 4],
     pub(super) saturation: [f32; 4],
     /// Largest raw number and how many samples have it.
@@ -45,6 +45,8 @@ pub(super) struct ChartFrames {
     pub(super) fingerprints: Vec<u64>,
     /// Where a file's exposure is not the manifest's.
     pub(super) other_exposure: Option<String>,
+    /// Where the pictures clip, if that is below the files' full scale.
+    pub(super) ceiling: Option<Ceiling>,
 }
 
 impl ChartFrame {
@@ -93,13 +95,15 @@ pub(super) fn read_chart(
     let all: Vec<(bool, &Frame)> =
         session.frames.iter().zip(&read).map(|(entry, (frame, _))| (lit(entry), frame)).collect();
     let defects = defective::find(&all);
+    let ceiling = Histogram::of(read.par_iter().map(|(frame, _)| frame)).and_then(|h| h.ceiling());
+    let clip = ceiling.map_or(f32::INFINITY, |ceiling| ceiling.level.into());
     let of_frame = |(entry, (frame, cfa)): (&FrameEntry, &(Frame, Cfa))| ChartFrame {
         light: entry.light,
         exposure: seconds_at_iso_100(entry),
         patches: patches.iter().map(|patch| stats(frame, patch, &defects)).collect(),
         cfa: *cfa,
         black: frame.black,
-        saturation: frame.saturation,
+        saturation: frame.saturation.map(|level| level.min(clip)),
         top: top(frame, &defects),
         size: [frame.width, frame.height],
         metadata: frame.metadata.clone(),
@@ -109,7 +113,7 @@ pub(super) fn read_chart(
     let pairs = session.frames.iter().zip(&read);
     let other_exposure =
         pairs.filter_map(|(entry, (frame, _))| exposure_warning(session, entry, frame)).next();
-    Ok(ChartFrames { frames, defects, fingerprints, other_exposure })
+    Ok(ChartFrames { frames, defects, fingerprints, other_exposure, ceiling })
 }
 
 /// Frames of two sizes have no photosites in common.

@@ -8,6 +8,7 @@ use super::moved::Pattern;
 use super::sheet_pose::{Pose, pose_of};
 use super::{CalibrateError, Progress};
 use crate::instrument::{CAMERA_FILE, Color, Defects, Optics};
+use crate::raw::{Ceiling, Histogram};
 use crate::session::{Board, FrameEntry, Session};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -68,6 +69,10 @@ struct Averaged {
     fingerprint: u64,
     /// Where the file's exposure is not the manifest's.
     other_exposure: Option<String>,
+    /// Share of the range in which samples do not clip.
+    usable_share: f64,
+    /// Of a file that leaves it open where samples clip.
+    histogram: Option<Histogram>,
 }
 
 /// Reads a white sheet's frames. Sheets whose lights are swapped, dead or overexposed are refused with the light's name.
@@ -82,7 +87,7 @@ pub(super) fn observe(
     let Known { camera, lights, .. } = known;
     session.check_lights(lights)?;
     let rects = grid(camera);
-    let frames = average_all(session, known, &rects, progress)?;
+    let (frames, ceiling) = average_all(session, known, &rects, progress)?;
     let exposures = Exposures { session, lights, frames: &frames, ambient: ambient(&frames) };
     // Before anything is looked for in the pictures: a strip on an overexposed sheet is not found either.
     exposures.check_complete()?;
@@ -98,6 +103,7 @@ pub(super) fn observe(
     let cells = cells_on(camera, &pose, &rects, grid_size(camera));
     let mut warnings = optics_warnings(session, known.optics, frames.iter().map(|f| &f.optics));
     warnings.extend(frames.iter().find_map(|frame| frame.other_exposure.clone()));
+    warnings.extend(ceiling.map(|ceiling| format!("{}: {}", session.name, ceiling.sentence())));
     warnings.extend(pose.warning.iter().cloned());
     let sheet_cells = exposures.cells_of_the_sheet(&cells)?;
     let numbers: Vec<usize> = sheet_cells.iter().map(|(k, _)| *k).collect();
@@ -145,8 +151,33 @@ fn average_all(
     known: Known,
     rects: &[Rect],
     progress: &Progress,
+) -> Result<(Vec<Averaged>, Option<Ceiling>), CalibrateError> {
+    let first = average_each(session, known, rects, &frames_to_search(session), progress)?;
+    let Some(ceiling) = ceiling(&first, known.color) else { return Ok((first, None)) };
+    // Clipped samples counted as light: once more without them.
+    let color = Color { clip_level: Some(ceiling.level.into()), ..known.color.clone() };
+    let known = Known { color: &color, ..known };
+    let mut frames = average_each(session, known, rects, &[], progress)?;
+    frames.iter_mut().zip(first).for_each(|(frame, first)| frame.board = first.board);
+    Ok((frames, Some(ceiling)))
+}
+
+/// Where pictures of other programs clip, unless the calibration says: as `solve` has it.
+fn ceiling(frames: &[Averaged], color: &Color) -> Option<Ceiling> {
+    if color.saturation_level.is_some() {
+        return None;
+    }
+    let histograms = frames.iter().filter_map(|frame| frame.histogram.clone());
+    histograms.reduce(Histogram::with)?.ceiling()
+}
+
+fn average_each(
+    session: &Session,
+    known: Known,
+    rects: &[Rect],
+    searched: &[usize],
+    progress: &Progress,
 ) -> Result<Vec<Averaged>, CalibrateError> {
-    let searched = frames_to_search(session);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let average = |(k, entry): (usize, &FrameEntry)| {
         let tick = || {
@@ -197,6 +228,8 @@ fn average(
         optics: Optics::of(&frame.metadata),
         fingerprint: fingerprint(&frame),
         other_exposure: exposure_warning(session, entry, &frame),
+        usable_share: levels.usable_share(),
+        histogram: Histogram::of_frame(&frame),
     })
 }
 
@@ -378,7 +411,7 @@ impl Exposures<'_> {
         let brightest = (0..self.lights).map(|l| self.level(l, &cells)).fold(0.0, f64::max);
         let ambient = self.frames.iter().filter(|frame| frame.light.is_none());
         let ambient = ambient
-            .flat_map(|frame| frame.cells.iter().map(|cell| cell.value[1]))
+            .flat_map(|frame| frame.cells.iter().map(|cell| cell.value[1] / frame.usable_share))
             .filter(|v| v.is_finite())
             .fold(0.0, f64::max);
         levels::check_lit(&self.session.manifest_path(), brightest, ambient)
@@ -424,12 +457,13 @@ impl Exposures<'_> {
         Ok(())
     }
 
-    /// Share of full scale that a light's brightest cells reach (99th percentile) in its brightest frame.
+    /// Share of full scale (or of what lies below the clipping) that a light's brightest cells reach (99th percentile) in its
+    /// brightest frame.
     fn level(&self, light: usize, cells: &[usize]) -> f64 {
         let of_frame = |frame: &Averaged| {
             let mut values: Vec<f64> = cells
                 .iter()
-                .map(|k| self.signal(frame, *k)[1] * frame.exposure)
+                .map(|k| self.signal(frame, *k)[1] * frame.exposure / frame.usable_share)
                 .filter(|v| v.is_finite())
                 .collect();
             values.sort_unstable_by(f64::total_cmp);

@@ -101,18 +101,19 @@ pub fn write_owned_toml<T: Serialize>(path: &Path, value: &T) -> Result<(), File
     write_owned(path, &toml_bytes(path, value)?)
 }
 
-/// As [`write_owned_toml`], for a value that carries on what the file said: it may have been edited, and is then no more the
-/// program's than before.
+/// As [`write_owned_toml`], for a value that carries on what the file said. One that was edited since stays as it is, with
+/// its comments, and so does another program's: the answer says whose it is.
 ///
 /// # Errors
 /// Where it cannot be written.
-pub fn update_owned_toml<T: Serialize>(path: &Path, value: &T) -> Result<(), FileError> {
+pub fn update_owned_toml<T: Serialize>(path: &Path, value: &T) -> Result<Owned, FileError> {
     let bytes = toml_bytes(path, value)?;
     let mut list = FileList::read(parent_of(path));
-    match owned(path, &list)? {
-        Owned::NotOurs => write_atomic(path, &bytes),
-        Owned::Absent | Owned::Ours => replace(path, &bytes, &sha256_hex(&bytes), &mut list),
+    let found = owned(path, &list)?;
+    if found != Owned::NotOurs {
+        replace(path, &bytes, &sha256_hex(&bytes), &mut list)?;
     }
+    Ok(found)
 }
 
 /// Deletes those files of `folder` that `is_meant`, and that are still what the program wrote; the others stay. What cannot be
@@ -183,14 +184,18 @@ mod tests {
         let error = write_owned(&at("camera.toml"), b"e").unwrap_err().to_string();
         assert!(error.contains("camera.toml: "), "{error}");
         assert_eq!(fs::read_to_string(at("camera.toml")).unwrap(), "mine");
-        // The same content does no harm, and what carries it on may be written.
+        // The same content does no harm.
         write_owned(&at("camera.toml"), b"mine").unwrap();
         assert_eq!(check_owned(&at("camera.toml")).unwrap(), Owned::Ours);
         fs::remove_file(at(LIST_FILE)).unwrap();
         assert!(check_owned(&at("camera.toml")).is_err());
-        update_owned_toml(&at("camera.toml"), &toml::Table::new()).unwrap();
-        assert_eq!(fs::read_to_string(at("camera.toml")).unwrap(), "");
+        let update = || update_owned_toml(&at("camera.toml"), &toml::Table::new()).unwrap();
+        assert_eq!(update(), Owned::NotOurs);
+        assert_eq!(fs::read_to_string(at("camera.toml")).unwrap(), "mine");
         assert!(check_owned(&at("camera.toml")).is_err());
+        fs::remove_file(at("camera.toml")).unwrap();
+        assert_eq!(update(), Owned::Absent);
+        assert_eq!(update(), Owned::Ours);
     }
 
     /// Killed before, between and after the two writes of the list, the file can be replaced again.

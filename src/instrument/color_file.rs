@@ -2,7 +2,8 @@
 
 use super::{Color, Noise};
 use crate::files::{
-    Document, FileError, Provenance, ProvenanceTable, SCHEMA, update_owned_toml, write_owned_toml,
+    Document, FileError, Owned, Provenance, ProvenanceTable, SCHEMA, update_owned_toml,
+    write_owned_toml,
 };
 use crate::quantity::{
     BLACK_DN, COLOR_MATRIX, ELECTRONS_PER_DN, KAPPA, Problem, READ_NOISE_E, SATURATION_DN,
@@ -93,7 +94,7 @@ pub fn write_color(folder: &Path, color: &Color, provenance: &Provenance) -> Res
     write_owned_toml(&path, &file)
 }
 
-/// As [`write_color`], with what `color.toml` said but for what was measured since: it may have been edited.
+/// As [`write_color`], with what `color.toml` said but for what was measured since. A file that was edited stays as it is.
 ///
 /// # Errors
 /// Where it cannot be written.
@@ -101,7 +102,7 @@ pub fn update_color(
     folder: &Path,
     color: &Color,
     provenance: &Provenance,
-) -> Result<(), FileError> {
+) -> Result<Owned, FileError> {
     let (path, file) = (folder.join(COLOR_FILE), file_of(color, provenance));
     check_numbers(&file).map_err(|problem| FileError::unwritable(&path, &problem))?;
     update_owned_toml(&path, &file)

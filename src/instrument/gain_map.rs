@@ -2,7 +2,8 @@
 
 use crate::files::{FileError, InputKind, read_input};
 use crate::quantity::GAIN;
-use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
+use crate::raster::{Exr, Values, decode_exr};
+use exr::prelude::WritableImage;
 use std::io::Cursor;
 use std::path::Path;
 use weavelight_calibration::description::Image;
@@ -15,20 +16,19 @@ pub(super) fn read_gain_map(path: &Path) -> Result<Image<[f32; 3]>, FileError> {
         let remedy = "restore the file or run `weavelight calibrate lights` again";
         FileError::Content { path: path.to_owned(), what: format!("{what}; {remedy}") }
     };
-    let picture = read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| Image::filled(size.width(), size.height(), [0f32; 3]),
-            |image: &mut Image<[f32; 3]>, place, (r, g, b): (f32, f32, f32)| {
-                image.data[place.y() * image.width + place.x()] = [r, g, b];
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| wrong(format!("is no RGB OpenEXR picture ({error})")))?;
-    let map = picture.layer_data.channel_data.pixels;
+    let no_rgb = |error: String| wrong(format!("is no RGB OpenEXR picture ({error})"));
+    let picture = decode_exr(&bytes)
+        .and_then(Exr::into_picture)
+        .map_err(|error| no_rgb(error.to_string()))?;
+    if let Some(what) = &picture.no_frame {
+        return Err(wrong(format!("is {what}; a gain is missing")));
+    }
+    let Values::F32(values) = &picture.values else { return Err(no_rgb("no numbers".into())) };
+    if picture.channels != 3 {
+        return Err(no_rgb("it is grey".into()));
+    }
+    let data = values.as_chunks::<3>().0.to_vec();
+    let map = Image { width: picture.width, height: picture.height, data };
     match map.data.iter().flatten().find_map(|gain| GAIN.check(f64::from(*gain)).err()) {
         Some(what) => Err(wrong(format!("a gain of it {what}"))),
         None => Ok(map),

@@ -441,3 +441,38 @@ fn a_gain_map_that_is_no_picture_is_told() {
         assert!(error.lines().count() <= 2, "{error}");
     }
 }
+
+#[test]
+fn a_gain_map_that_leaves_part_of_the_frame_open_is_refused() {
+    use exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, WritableImage};
+    let folder = tempfile::tempdir().unwrap();
+    write_lights(folder.path(), &lights(), &provenance()).unwrap();
+    let mut maps = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path());
+    let map = maps.find(|p| p.extension().is_some_and(|e| e == "exr")).unwrap();
+    // Gains of 4 x 4 texels at (at, at) of a display window of 4 x 4.
+    let load = |at: i32| {
+        let gain = |place: exr::prelude::Vec2<usize>| {
+            let gain = 1.0 + place.x() as f32;
+            (gain, gain, gain)
+        };
+        let attributes = LayerAttributes {
+            layer_position: exr::prelude::Vec2(at, at),
+            ..LayerAttributes::default()
+        };
+        let size = if at < 0 { (6, 6) } else { (4, 4) };
+        let layer =
+            Layer::new(size, attributes, Encoding::UNCOMPRESSED, SpecificChannels::rgb(gain));
+        let mut image = Image::from_layer(layer);
+        image.attributes.display_window =
+            exr::meta::attribute::IntegerBounds::from_dimensions((4, 4));
+        image.write().non_parallel().to_file(&map).unwrap();
+        Calibration::load(folder.path())
+    };
+    let whole = load(0).unwrap().lights[0].gain_map.clone().unwrap();
+    assert_eq!((whole.width, whole.height, whole.data[3]), (4, 4, [4.0; 3]));
+    // What lies beyond the frame is cut off, and the rest in its place.
+    let cut = load(-1).unwrap().lights[0].gain_map.clone().unwrap();
+    assert_eq!((cut.width, cut.height, cut.data[0]), (4, 4, [2.0; 3]));
+    let error = load(1).unwrap_err().to_string();
+    assert!(error.contains("covers only part of its display window"), "{error}");
+}

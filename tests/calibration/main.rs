@@ -11,6 +11,7 @@
 
 mod bench;
 mod boards;
+mod ceilings;
 mod chain;
 mod effects;
 mod figures;

@@ -4,11 +4,12 @@ use super::{criteria, failed};
 use crate::board::{BoardError, BoardShape, BoardView, NoBoard, outlying_corners};
 use crate::description::Image;
 use opencv::core::{Mat, Point2f, Size, TermCriteria, Vector};
-use opencv::prelude::{CLAHETrait, MatTraitConst, MatTraitConstManual};
+use opencv::prelude::{CLAHETrait, MatTraitConst};
 use opencv::{calib3d, imgproc};
 
 mod cause;
 mod picture;
+mod quads;
 
 use picture::Searched;
 
@@ -23,9 +24,6 @@ const REFINE_REACH_PX: f64 = 1.5;
 const DOUBTFUL_SHARE: f64 = 0.2;
 /// Corners nearer than this in the searched picture are not told apart.
 const LEAST_SQUARE_PX: usize = 4;
-/// The classic detector compares every dark patch with every other one: with more of them than this, as fine cloth has, it
-/// would take minutes. Its own quick test then decides.
-const MOST_PATCHES: i32 = 1500;
 
 /// Which detector found the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,7 +58,15 @@ pub fn detect(
     shape: &BoardShape,
     tick: &dyn Fn(),
 ) -> Result<Result<Found, NoBoard>, BoardError> {
-    find(grey, shape, tick).map_err(failed)
+    find(grey, shape, tick, &mut Effort::default()).map_err(failed)
+}
+
+/// What a search has cost: calls of the detectors, and pixels looked at by either.
+#[derive(Clone, Copy, Debug, Default)]
+struct Effort {
+    sector_based: usize,
+    classic: usize,
+    pixels: usize,
 }
 
 /// One way to look.
@@ -111,6 +117,7 @@ fn find(
     grey: &Image<f32>,
     shape: &BoardShape,
     tick: &dyn Fn(),
+    effort: &mut Effort,
 ) -> opencv::Result<Result<Found, NoBoard>> {
     let searched = Searched::of(grey);
     if let Some(cause) = cause::hopeless(&searched, shape) {
@@ -119,7 +126,7 @@ fn find(
     let mut crooked: Option<usize> = None;
     for attempt in ATTEMPTS {
         tick();
-        let Some(start) = corners_of(&searched, shape, attempt)? else { continue };
+        let Some(start) = corners_of(&searched, shape, attempt, effort)? else { continue };
         tick();
         let found = refine_both(grey, &searched, shape, &start, attempt.detector)?;
         let doubtful = found.refined.doubtful.len();
@@ -140,6 +147,7 @@ fn corners_of(
     searched: &Searched,
     shape: &BoardShape,
     attempt: Attempt,
+    effort: &mut Effort,
 ) -> opencv::Result<Option<Vec<[f64; 2]>>> {
     let (reduction, even) = match attempt.version {
         Version::Whole => (1, false),
@@ -160,7 +168,8 @@ fn corners_of(
         plain.copy_to(&mut evened)?;
     }
     let mut corners: Vector<Point2f> = Vector::new();
-    if !search(&evened, shape, attempt, &mut corners)? {
+    effort.pixels += (evened.cols() * evened.rows()) as usize;
+    if !search(&evened, shape, attempt, &mut corners, effort)? {
         return Ok(None);
     }
     let scale = (searched.factor * reduction) as f64;
@@ -174,43 +183,21 @@ fn search(
     shape: &BoardShape,
     attempt: Attempt,
     corners: &mut Vector<Point2f>,
+    effort: &mut Effort,
 ) -> opencv::Result<bool> {
     let size = Size::new(shape.columns as i32, shape.rows as i32);
     if attempt.detector == Detector::SectorBased {
+        effort.sector_based += 1;
         return calib3d::find_chessboard_corners_sb(picture, size, corners, attempt.flags);
     }
-    let busy = patches(picture)? > MOST_PATCHES;
-    let quick = if busy { calib3d::CALIB_CB_FAST_CHECK } else { 0 };
-    if busy && !calib3d::check_chessboard(picture, size)? {
-        return Ok(false);
-    }
-    if !calib3d::find_chessboard_corners(picture, size, corners, attempt.flags | quick)? {
+    let Some(flags) = quads::bounded(picture, shape, attempt.flags)? else { return Ok(false) };
+    effort.classic += 1;
+    if !calib3d::find_chessboard_corners(picture, size, corners, flags)? {
         return Ok(false);
     }
     let places: Vec<[f64; 2]> = corners.iter().map(|p| [f64::from(p.x), f64::from(p.y)]).collect();
     sub_pixel(picture, corners, window_px(shape, &places))?;
     Ok(true)
-}
-
-/// Dark patches that are large enough for a square.
-fn patches(picture: &Mat) -> opencv::Result<i32> {
-    let mut dark = Mat::default();
-    let window = (picture.cols() / 10).max(3) | 1;
-    let (method, kind) = (imgproc::ADAPTIVE_THRESH_MEAN_C, imgproc::THRESH_BINARY_INV);
-    imgproc::adaptive_threshold(picture, &mut dark, 255.0, method, kind, window, 0.0)?;
-    let (mut labels, mut stats, mut centres) = (Mat::default(), Mat::default(), Mat::default());
-    imgproc::connected_components_with_stats(
-        &dark,
-        &mut labels,
-        &mut stats,
-        &mut centres,
-        4,
-        opencv::core::CV_32S,
-    )?;
-    let area = imgproc::CC_STAT_AREA as usize;
-    let rows = stats.data_typed::<i32>()?.chunks(stats.cols().max(1) as usize);
-    let large = rows.skip(1).filter(|row| row.get(area).is_some_and(|area| *area >= 9)).count();
-    Ok(large as i32)
 }
 
 /// Corners sharpened on the full picture, in both ways; those that run away or lie out of line do not count.
@@ -295,3 +282,6 @@ fn window_px(shape: &BoardShape, corners: &[[f64; 2]]) -> i32 {
     let least = in_rows.chain(down).fold(f64::INFINITY, f64::min);
     (WINDOW_SHARE * least).clamp(WINDOW_PX.0, WINDOW_PX.1) as i32
 }
+
+#[cfg(test)]
+mod tests;

@@ -216,8 +216,9 @@ fn settle(
             let calm = near && (problem.slow.total() / before).ln().abs() < SCALE_SETTLED;
             open = !calm && (iterations < SCALE_ROUNDS || !near);
         }
-        let at = problem.assemble(&systems, &state).ok_or(Error::Singular)?;
-        ripples = problem.ripples_from(&systems, &state).ok_or(Error::Singular)?;
+        let joint = problem.joint(&systems, &state).ok_or(Error::Singular)?;
+        let at = problem.marginal(&joint).ok_or(Error::Singular)?;
+        ripples = problem.ripples_from(&systems, &joint).ok_or(Error::Singular)?;
         let (next, decrement) = advance(problem, &state, &at, &weights, &mut lambda)?;
         let last = iterations == settings.max_iterations;
         if decrement < if last { SETTLED_ENOUGH } else { SETTLED } && (last || !open) {

@@ -310,7 +310,7 @@ impl<'a> Problem<'a> {
             let readings = &self.readings[s][range.clone()];
             system.add_cell(&at, readings, &weights[range], &placed, &ripples);
         }
-        system.scale(self.data_scale.recip());
+        system.finish(self.data_scale.recip());
         system
     }
 
@@ -348,7 +348,11 @@ impl<'a> Problem<'a> {
 
     /// All sheets and priors together, all slow errors eliminated.
     pub(super) fn assemble(&self, systems: &[SheetSystem], state: &State) -> Option<Linearised> {
-        let joint = self.joint(systems, state)?;
+        self.marginal(&self.joint(systems, state)?)
+    }
+
+    /// Without the slow errors that sheets share.
+    pub(super) fn marginal(&self, joint: &Linearised) -> Option<Linearised> {
         let n = self.parameters();
         let shared = joint.hessian.nrows() - n;
         let factor = Cholesky::new(joint.hessian.view((n, n), (shared, shared)).into_owned())?;
@@ -359,18 +363,17 @@ impl<'a> Problem<'a> {
             .then_some(())?;
         let mut hessian = joint.hessian.view((0, 0), (n, n)).into_owned();
         let mut descent = joint.descent.rows(0, n).into_owned();
-        hessian.gemm_tr(-1.0, &cross, &cross, 1.0);
+        hessian.gemm(-1.0, &cross.transpose(), &cross, 1.0);
         descent.gemv_tr(-1.0, &cross, &right, 1.0);
         Some(Linearised { hessian, descent, cost: joint.cost - 0.5 * right.norm_squared() })
     }
 
-    /// The most probable slow errors of every sheet at the state of `systems`, light by light.
+    /// The most probable slow errors of every sheet at the state of `systems` and their `joint`, light by light.
     pub(super) fn ripples_from(
         &self,
         systems: &[SheetSystem],
-        state: &State,
+        joint: &Linearised,
     ) -> Option<Vec<DVector<f64>>> {
-        let joint = self.joint(systems, state)?;
         let n = self.parameters();
         let shared = joint.hessian.nrows() - n;
         let factor = Cholesky::new(joint.hessian.view((n, n), (shared, shared)).into_owned())?;

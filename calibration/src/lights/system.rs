@@ -13,6 +13,8 @@ pub(super) struct SheetSystem {
     /// Half the weighted square sum.
     cost: f64,
     mean: DVector<f64>,
+    /// Weighted sums of J's rows in each cell over the root of its weight, column by column: what the free gains take.
+    gains: Vec<f64>,
     /// Lights and pose: the parameters that stay.
     kept: usize,
     ripples_per_light: usize,
@@ -25,6 +27,9 @@ pub(super) struct Reduced {
     descent: DVector<f64>,
     cost: f64,
 }
+
+/// Cells whose gains are taken out together.
+const GAINS_AT_ONCE: usize = 256;
 
 /// One row of J: a light in a cell.
 struct Row<'a> {
@@ -45,6 +50,7 @@ impl SheetSystem {
             descent: zeros.clone(),
             cost: 0.0,
             mean: zeros,
+            gains: Vec::new(),
             kept,
             ripples_per_light,
         }
@@ -82,7 +88,18 @@ impl SheetSystem {
             let row = Row { by_light: &at.by_light, by_pose, ripples, at: starts };
             self.add_row(&row, weights[i], residuals[i] - gain);
         }
-        self.hessian.syger(-1.0 / total, &self.mean, &self.mean, 1.0);
+        let share = total.sqrt().recip();
+        self.gains.extend(self.mean.iter().map(|value| share * value));
+        if self.gains.len() >= GAINS_AT_ONCE * self.mean.len() {
+            self.take_gains();
+        }
+    }
+
+    /// Takes the free gains of many cells out at once: one product of matrices is several times as fast as one update a cell.
+    fn take_gains(&mut self) {
+        let n = self.mean.len();
+        let gains = DMatrix::from_vec(n, self.gains.len() / n, std::mem::take(&mut self.gains));
+        self.hessian.gemm(-1.0, &gains, &gains.transpose(), 1.0);
     }
 
     fn add_row(&mut self, row: &Row, weight: f64, residual: f64) {
@@ -103,7 +120,9 @@ impl SheetSystem {
         }
     }
 
-    pub(super) fn scale(&mut self, factor: f64) {
+    /// To be called once, after the last cell.
+    pub(super) fn finish(&mut self, factor: f64) {
+        self.take_gains();
         self.hessian *= factor;
         self.descent *= factor;
         self.cost *= factor;
@@ -164,7 +183,8 @@ impl SheetSystem {
         let l = factor.l_dirty();
         (l.solve_lower_triangular_mut(&mut cross) && l.solve_lower_triangular_mut(&mut right))
             .then_some(())?;
-        hessian.gemm_tr(-1.0, &cross, &cross, 1.0);
+        // Not `gemm_tr`, which takes column by column.
+        hessian.gemm(-1.0, &cross.transpose(), &cross, 1.0);
         descent.gemv_tr(-1.0, &cross, &right, 1.0);
         Some(Reduced { hessian, descent, cost: self.cost - 0.5 * right.norm_squared() })
     }
@@ -212,5 +232,67 @@ impl Reduced {
             }
         }
         out.cost += self.cost;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lights::bench_scene::{Bench, poses};
+    use crate::lights::joint::{Problem, State, place};
+
+    /// J'W (I - 1 w' / sum w) J and its right side, written out with dense matrices.
+    fn plain(problem: &Problem, state: &State, weights: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
+        let (lights, sheet, per_light) =
+            (problem.lights, &problem.sheets[0], problem.slow.per_light());
+        let kept = lights * PER_LIGHT + PER_SHEET;
+        let n = kept + lights * per_light;
+        let (mut hessian, mut descent) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let residuals = problem.residuals(state);
+        for (c, cell) in sheet.cells.iter().enumerate() {
+            let placed = place(sheet, cell, &state.poses[0]);
+            let ripples = problem.slow.at(sheet, cell);
+            let mut rows = DMatrix::zeros(lights, n);
+            for (i, emitter) in state.emitters.iter().enumerate() {
+                let at = emitter.linearise(&placed.point, &placed.normal).unwrap();
+                (0..PER_LIGHT).for_each(|k| rows[(i, i * PER_LIGHT + k)] = at.by_light[k]);
+                for k in 0..PER_SHEET {
+                    rows[(i, kept - PER_SHEET + k)] = at.by_point.dot(&placed.point_by_pose[k])
+                        + at.by_normal.dot(&placed.normal_by_pose[k]);
+                }
+                (0..per_light).for_each(|k| rows[(i, kept + i * per_light + k)] = ripples[k]);
+            }
+            let range = c * lights..(c + 1) * lights;
+            let w = DVector::from_column_slice(&weights[range.clone()]);
+            let r = DVector::from_column_slice(&residuals[0][range]);
+            let weight = DMatrix::from_diagonal(&w) - &w * w.transpose() / w.sum();
+            hessian += rows.transpose() * &weight * &rows;
+            descent += rows.transpose() * weight * r;
+        }
+        (hessian, descent)
+    }
+
+    /// More cells than are taken out at once, and a number that is no multiple of it.
+    #[test]
+    fn the_equations_are_those_of_a_plain_reference() {
+        let bench = Bench { grid: [24, 16], ..Bench::default() };
+        let leds = bench.leds();
+        let sheets = bench.sheets(&leds, &poses()[..1]);
+        let problem = Problem::new(&sheets, bench.priors(&leds));
+        let mut state = State::start(&bench.priors(&leds), 1);
+        problem.level(&mut state);
+        let weights = problem.weights(&problem.residuals(&state));
+        let system = &problem.systems(&state, &weights)[0];
+        let (hessian, descent) = plain(&problem, &state, &weights[0]);
+        let size = hessian.diagonal().map(f64::sqrt);
+        for column in 0..hessian.ncols() {
+            for row in column..hessian.nrows() {
+                let off = system.hessian[(row, column)] - hessian[(row, column)];
+                assert!(off.abs() <= 1e-11 * size[row] * size[column], "{row}, {column}: {off}");
+            }
+        }
+        let reach = (2.0 * system.cost).sqrt();
+        let off = (&system.descent - descent).component_div(&(size * reach)).amax();
+        assert!(off < 1e-11, "{off}");
     }
 }
