@@ -47,8 +47,7 @@ pub(super) fn load(path: &Path, kind: Kind) -> Result<Session, CalibrateError> {
             Kind::Grey => "a chart",
             Kind::Swatch => "a fabric",
         };
-        let remedy =
-            format!("photograph it with `weavelight scan`, {} {}", Setting("kind"), name_of(kind));
+        let remedy = format!("photograph one: a scan with {} {}", Setting("kind"), name_of(kind));
         return Err(CalibrateError::target(place, format!("no picture of {target}"), remedy));
     }
     session.check_files()?;

@@ -71,7 +71,7 @@ pub enum FileError {
         what: String,
     },
     /// The output folder holds something that is not ours to replace.
-    #[error("{}: {what}; move that elsewhere, or choose an empty or new folder ({})", shown(.path).display(), Setting("out"))]
+    #[error("{}: {what}; move that elsewhere, or choose an empty or new {}", shown(.path).display(), Setting("out"))]
     Occupied {
         /// The folder.
         path: PathBuf,

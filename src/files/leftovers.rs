@@ -34,10 +34,19 @@ pub(super) fn clean(target: &Path) {
             None if is_ours && found.as_encoded_bytes().ends_with(ASIDE.as_bytes()) => {
                 put_back(&path, target);
             }
+            None if is_ours && is_just_begun(&path) => remove_unfinished(&path),
             None if is_ours => remove_replaced(&path),
             None => {}
         }
     }
+}
+
+/// Whether the run was killed between making the mark and writing into it: nothing else is there yet.
+fn is_just_begun(path: &Path) -> bool {
+    let mut entries = fs::read_dir(path).into_iter().flatten();
+    let only = (entries.next(), entries.next());
+    matches!(only, (Some(Ok(mark)), None)
+        if mark.file_name() == UNFINISHED && mark.metadata().is_ok_and(|data| data.len() == 0))
 }
 
 /// It was never anybody's: nothing is lost with it. The mark goes last: killed in between, the next run still knows it.
@@ -117,6 +126,7 @@ mod tests {
         let at = |name: &str| home.path().join(name);
         folder(&at(".out.partial-abc123"), &[(UNFINISHED, "out"), ("normal.exr", "half")]);
         folder(&at(".out.partial-abc124"), &[]);
+        folder(&at(".out.partial-abc130"), &[(UNFINISHED, "")]);
         folder(&at(".other.partial-abc125"), &[(UNFINISHED, "other"), ("x", "half")]);
         folder(&at(".out.partial-abc126"), &[("normal.exr", "old")]);
         FileList::of(&at(".out.partial-abc126"), &[])
@@ -125,6 +135,7 @@ mod tests {
             .unwrap();
         // Under its name by chance, or edited, or being written.
         folder(&at(".out.partial-abc127"), &[("notes.txt", "mine")]);
+        folder(&at(".out.partial-abc131"), &[(UNFINISHED, ""), ("notes.txt", "mine")]);
         folder(&at(".out.partial-abc128"), &[("normal.exr", "old")]);
         FileList::of(&at(".out.partial-abc128"), &[])
             .unwrap()
@@ -138,7 +149,15 @@ mod tests {
         let mut names: Vec<_> =
             fs::read_dir(home.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
         names.sort();
-        assert_eq!(names, [".busy.partial-abc129", ".out.partial-abc127", ".out.partial-abc128"]);
+        assert_eq!(
+            names,
+            [
+                ".busy.partial-abc129",
+                ".out.partial-abc127",
+                ".out.partial-abc128",
+                ".out.partial-abc131"
+            ]
+        );
     }
 
     #[test]

@@ -55,6 +55,9 @@ const ERRORS: [(&str, &str); 8] = [
     ("mkdir", "ENOSPC"),
 ];
 
+/// The writes with which a run ends are its words, on standard output and standard error.
+const LAST_WORDS: usize = 3;
+
 /// Whether to go on: not where a variable says to leave these tests out.
 ///
 /// # Panics
@@ -183,9 +186,16 @@ fn failing_system_calls() {
                 let before = content(&home.path().join("out"));
                 let inject = format!("inject={name}:error={error}:when={when}{more}");
                 let ended = under_strace(home.path(), writer.call, &inject);
+                // The program was not even loaded.
+                if ended.said.contains("error while loading shared libraries") {
+                    continue;
+                }
                 done += 1;
-                let kept = content(&home.path().join("out")) == before;
+                // Where no write succeeds, the result and the error cannot be printed either.
+                let is_mute = name == "write" && (!more.is_empty() || when + LAST_WORDS > *count);
+                let kept = is_mute || content(&home.path().join("out")) == before;
                 let manners = match ended.status.success() || kept || before.is_empty() {
+                    true if is_mute && ended.said.is_empty() => Ok(()),
                     true => check_manners(&ended),
                     false => Err("a failed run changed the earlier output".to_owned()),
                 };

@@ -47,15 +47,11 @@ const BOARD: &str =
 fn sessions_without_pictures() {
     let home = folders(&[("b", BOARD), ("g", "kind = \"grey\"\n"), ("w", "kind = \"white\"\n")]);
     let at = |name: &str| home.path().join(name).join("session.toml").display().to_string();
-    let expected = format!(
-        "{}: no picture of a board; photograph it with `weavelight scan --kind board`",
-        at("b")
-    );
+    let expected =
+        format!("{}: no picture of a board; photograph one: a scan with kind board", at("b"));
     assert_eq!(camera(home.path(), &["b"]), expected);
-    let expected = format!(
-        "{}: no picture of a chart; photograph it with `weavelight scan --kind grey`",
-        at("g")
-    );
+    let expected =
+        format!("{}: no picture of a chart; photograph one: a scan with kind grey", at("g"));
     assert_eq!(color(home.path(), "g"), expected);
     // Of another kind is told first.
     assert!(camera(home.path(), &["w"]).contains("this is no board capture session"));
@@ -78,7 +74,7 @@ fn sessions_that_name_what_is_not_there() {
     assert!(none.contains("no capture session was given"), "{none}");
     std::fs::write(home.path().join("out"), "mine").unwrap();
     let file = camera(home.path(), &["n"]);
-    assert!(file.contains("out: is a file; ") && file.ends_with(" with --out"), "{file}");
+    assert!(file.contains("out: is a file; ") && file.ends_with(" new output folder"), "{file}");
 }
 
 fn black(picture: &mut Picture) {

@@ -76,6 +76,8 @@ const AT: usize = 3;
 
 #[test]
 fn every_fault_does_what_the_table_says() {
+    // What the user of the command line sees.
+    weavelight::files::name_settings(|name| format!("--{name}"));
     let cases = cases();
     assert!(cases.len() >= 25);
     let (next, failures) = (AtomicUsize::new(0), Mutex::new(Vec::new()));

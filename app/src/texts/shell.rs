@@ -94,7 +94,7 @@ pub fn no_window(error: &eframe::Error) -> String {
     match error {
         eframe::Error::AppCreation(error) => error.to_string(),
         error => format!(
-            "the window cannot be opened ({error}); start it from a desktop, or use the command line: weavelight --help"
+            "the window cannot be opened ({error}); start it from a desktop, or use the command line (`weavelight help`)"
         ),
     }
 }
