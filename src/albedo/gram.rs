@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 pub(super) const TERMS: usize = 2 * FEATURES;
 /// One, the terms, and what they are to explain.
 const COLUMNS: usize = TERMS + 2;
-const RUN: usize = 64;
+const RUN: usize = 256;
 const LANES: usize = 16;
 
 /// Coefficients of the terms.
