@@ -10,12 +10,14 @@
 //! - [`raw`]: a frame as the sensor wrote it
 //! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
 //!   [`solution`]: the folder that a solve writes
+//! - [`albedo`]: the colours of a solved mosaic
 //! - [`photometry`]: the kernels, on one band of rows; [`gpu`]: their first step on a graphics processor; [`solve`]: the run
 //!   around them
 //! - [`simulate`]: the simulated rig's folders
 //! - [`device`]: the light board, and what else the capture needs of the world
 //! - [`report`]: what a command tells; [`mod@bench`]: run time against error
 
+pub mod albedo;
 pub mod bench;
 pub mod calibrate;
 pub mod cli;

@@ -6,7 +6,9 @@ use crate::files::FileError;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{self, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown};
+use crate::solve::{
+    self, AlbedoKind, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown,
+};
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -48,6 +50,9 @@ pub(super) struct Args {
     /// Who solves photosites that have all their samples [default: auto]
     #[arg(long)]
     device: Option<DeviceName>,
+    /// What the albedo is: reflectance, with the shading of unresolved relief divided out into shade.exr, or as it appears
+    #[arg(long, default_value = "reflectance")]
+    albedo: AlbedoName,
     /// Make only these, comma-separated: maps, png for both as pictures, page for report.html [default: all]
     #[arg(long, value_name = "MAP,...", value_delimiter = ',')]
     only: Vec<Wanted>,
@@ -103,10 +108,28 @@ enum NormalYName {
     Down,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AlbedoName {
+    /// Comparable with a spectrophotometer; albedo times shade gives the photographs back
+    Reflectance,
+    /// With the shading in it; shade is 1
+    Appearance,
+}
+
+impl From<AlbedoName> for AlbedoKind {
+    fn from(name: AlbedoName) -> Self {
+        match name {
+            AlbedoName::Reflectance => Self::Reflectance,
+            AlbedoName::Appearance => Self::Appearance,
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Wanted {
     Normal,
     Albedo,
+    Shade,
     Confidence,
     Png,
     Page,
@@ -166,6 +189,7 @@ impl Args {
         options.outputs = Outputs {
             normal: self.wants(Wanted::Normal),
             albedo: self.wants(Wanted::Albedo),
+            shade: self.wants(Wanted::Shade),
             confidence: self.wants(Wanted::Confidence),
             png: self.wants(Wanted::Png),
         };
@@ -177,6 +201,7 @@ impl Args {
         };
         options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
         options.residuals = if self.residuals { Residuals::Write } else { Residuals::Leave };
+        options.albedo = self.albedo.into();
         options.threads = self.threads.map(|count| usize::try_from(count).unwrap_or(usize::MAX));
         Ok(options)
     }
@@ -223,9 +248,10 @@ fn text(report: &Report) -> String {
         1 => "photosites".to_owned(),
         side => format!("pixels of {side} x {side} photosites"),
     };
+    let kind = report.albedo.as_ref().map_or("albedo", |albedo| albedo.kind.as_str());
     format!(
         "{:.1} % of {} {what} solved from {} lights{scale}\n\
-         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, albedo in {}, {seconds:.1} s{with}",
+         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, {kind} in {}, {seconds:.1} s{with}",
         percent(report.solved),
         report.pixels,
         report.lights_used.len(),

@@ -138,6 +138,7 @@ fn maps(
         ),
         figure(picture::colors(&albedo, gain), albedo_caption(gain)),
     ];
+    maps.extend(shade(&shown.maps.shade));
     if let Some(expected) = expected {
         let values: Vec<[f32; 1]> = shown.maps.confidence.data.iter().map(|v| [*v]).collect();
         let (width, height) = (shown.maps.confidence.width, shown.maps.confidence.height);
@@ -152,6 +153,19 @@ fn maps(
         maps.push(scaled(angles, normal, "Error of the normal against the truth"));
     }
     maps
+}
+
+/// What was divided out of the albedo, where anything was.
+fn shade(shade: &Image<f32>) -> Option<Figure> {
+    if !shade.data.iter().any(|&shade| shade > 0.0 && shade < 1.0) {
+        return None;
+    }
+    let data = shade.data.iter().map(|&shade| [shade; 3]).collect();
+    let shade = Image { width: shade.width, height: shade.height, data };
+    Some(Figure {
+        picture: picture::colors(&picture::shrink(&shade, LONGEST_SIDE), 1.0),
+        caption: "Shade of relief that is not resolved, divided out of the albedo".into(),
+    })
 }
 
 fn albedo_caption(gain: f32) -> String {

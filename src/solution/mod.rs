@@ -2,7 +2,7 @@
 
 mod report;
 
-pub use report::{DeviceReport, InputFolders, PlaneReport, Report, ResidualFile};
+pub use report::{AlbedoReport, DeviceReport, InputFolders, PlaneReport, Report, ResidualFile};
 
 use crate::files::{FileError, OutputKind};
 use std::path::{Path, PathBuf};
@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 pub const NORMAL_EXR: &str = "normal.exr";
 /// Albedo, linear RGB, float; 0 where unsolved.
 pub const ALBEDO_EXR: &str = "albedo.exr";
+/// What was divided out of the albedo, channel Y: the share of light that unresolved relief leaves; 0 where unsolved. A solution
+/// without it has its albedo as it appears, and its shade is 1.
+pub const SHADE_EXR: &str = "shade.exr";
 /// Expected RMS of the normal's total angular error, degrees, channel Y; 0 where unsolved.
 pub const CONFIDENCE_EXR: &str = "confidence.exr";
 /// Normals for looking and for engines, 16 bit.

@@ -49,6 +49,9 @@ pub struct Report {
     pub plane: PlaneReport,
     /// What the albedo's R, G, B are: "linear sRGB" or "white-balanced camera RGB".
     pub color_space: String,
+    /// What the albedo is; `None` in a report from before it was written: as it appears.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub albedo: Option<AlbedoReport>,
     /// What was found of the swatch, where the solve was to find it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swatch: Option<String>,
@@ -97,6 +100,25 @@ impl InputFolders {
         };
         Self { session: whole(session), calibration: whole(calibration) }
     }
+}
+
+/// What the albedo is, in `report.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlbedoReport {
+    /// "reflectance": shading by unresolved relief is divided out and lies in `shade.exr`; "appearance": it is left in.
+    pub kind: String,
+    /// Expected relative error of its level, one standard deviation; `None` where nothing tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_sigma: Option<f64>,
+    /// Dyes that the colours follow: 1, or 2 for several; `None` where that was not asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dyes: Option<u32>,
+    /// Share of the picture that was taken for a print.
+    #[serde(default)]
+    pub gated_share: f64,
+    /// Photosites whose value no reflectance can have, and that were limited.
+    #[serde(default)]
+    pub clamped: u64,
 }
 
 /// Who solved, in `report.json`.
@@ -264,6 +286,13 @@ mod tests {
             undistorted: false,
             plane: PlaneReport { point_mm: [0.0, 0.0, 5.0], normal: [0.0, 0.0, 1.0] },
             color_space: "linear sRGB".into(),
+            albedo: Some(AlbedoReport {
+                kind: "reflectance".into(),
+                level_sigma: Some(0.02),
+                dyes: Some(1),
+                gated_share: 0.25,
+                clamped: 3,
+            }),
             residuals: vec![ResidualFile { light: 3, file: "residual-03.exr".into() }],
             warnings: vec!["light 1 has no frame".into()],
             inputs: vec![Input { name: "session.toml".into(), sha256: "ab".into() }],

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// The revision of the solve. Raise it in every change after which the same inputs give other maps, be it in a kernel, in the
 /// noise estimate, in what is left out or in how files are encoded: solutions of earlier revisions are then made again. The
 /// golden test (`tests/golden.rs`) fails where a map changed and this did not.
-pub(crate) const REVISION: u32 = 2;
+pub(crate) const REVISION: u32 = 3;
 
 /// The inputs of a solve as they were when it began.
 pub(crate) struct Inputs {
@@ -132,8 +132,9 @@ fn settings(options: &Options) -> String {
     let device = if matches!(options.device, Device::Gpu) { "gpu" } else { "any" };
     let residuals = if options.residuals == Residuals::Write { "written" } else { "left" };
     let scale = options.scale as usize;
+    let albedo = options.albedo.name();
     format!(
-        "{PROGRAM}, solve {REVISION}: method {method}, grid {grid}, normal-y {normal_y}, scale {scale}, mask {mask}, device {device}, residuals {residuals}"
+        "{PROGRAM}, solve {REVISION}: method {method}, grid {grid}, normal-y {normal_y}, scale {scale}, mask {mask}, device {device}, residuals {residuals}, albedo {albedo}"
     )
 }
 

@@ -15,10 +15,11 @@ use weavelight_calibration::description::Image;
 
 /// Names of the files in which these maps are.
 pub(crate) fn map_files(outputs: Outputs) -> Vec<&'static str> {
-    let Outputs { normal, albedo, confidence, png } = outputs;
+    let Outputs { normal, albedo, shade, confidence, png } = outputs;
     let files = [
         (normal, solution::NORMAL_EXR),
         (albedo, solution::ALBEDO_EXR),
+        (shade, solution::SHADE_EXR),
         (confidence, solution::CONFIDENCE_EXR),
         (normal && png, solution::NORMAL_PNG),
         (albedo && png, solution::ALBEDO_PNG),
@@ -40,6 +41,7 @@ pub(crate) fn write_maps(
         match name {
             solution::NORMAL_EXR => write_exr_rgb(&path, &maps.normal),
             solution::ALBEDO_EXR => write_exr_rgb(&path, &maps.albedo),
+            solution::SHADE_EXR => write_exr_y(&path, &maps.shade),
             solution::CONFIDENCE_EXR => write_exr_y(&path, &maps.confidence),
             solution::NORMAL_PNG => {
                 let encode = |n| png_normal(n, options.normal_y);

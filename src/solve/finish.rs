@@ -1,10 +1,11 @@
 //! From maps on the mosaic to the maps of a solution: colour, and the grid that was asked for.
 
-use super::maps::{Albedo, Maps, is_solved};
-use super::options::Outputs;
+use super::colour::colour;
+use super::maps::{Maps, is_solved};
+use super::options::{AlbedoKind, Outputs};
 use crate::instrument::Color;
 use crate::photometry::Outcome;
-use crate::raw::demosaic;
+use crate::solution::AlbedoReport;
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use weavelight_calibration::description::{Camera, Image};
@@ -16,10 +17,16 @@ pub struct Finished {
     pub normal: Image<[f32; 3]>,
     /// Linear RGB; without a pixel where nobody asked for it.
     pub albedo: Image<[f32; 3]>,
+    /// What was divided out of the albedo; without a pixel where it was not asked for.
+    pub shade: Image<f32>,
     /// Expected error of the normal, degrees.
     pub confidence: Image<f32>,
     /// 255 where solved.
     pub mask: Image<u8>,
+    /// What the albedo is.
+    pub albedo_report: AlbedoReport,
+    /// What there is to say of it, in sentences.
+    pub said: Vec<String>,
 }
 
 /// What R, G, B mean.
@@ -31,28 +38,22 @@ pub(crate) fn color_space(color: &Color) -> &'static str {
 }
 
 /// Gives the albedo, if it is wanted, its hidden channels and the colour space of the calibration.
-pub(crate) fn finish(maps: Maps, color: &Color, outputs: Outputs) -> Finished {
+pub(crate) fn finish(maps: Maps, color: &Color, outputs: Outputs, kind: AlbedoKind) -> Finished {
     let Maps { normal, albedo, expected_error_deg, outcome, .. } = maps;
     let width = outcome.width;
     let mask = |outcome: &Outcome| if is_solved(*outcome) { 255 } else { 0 };
     let mask =
         Image { width, height: outcome.height, data: outcome.data.par_iter().map(mask).collect() };
-    let mut albedo = match albedo {
-        _ if !outputs.albedo => Image::filled(0, 0, [0.0; 3]),
-        Albedo::Mosaic(mosaic, cfa) => {
-            demosaic(&mosaic, cfa, &|x, y| mask.data[y * width + x] != 0)
-        }
-        Albedo::Grey(grey) => Image {
-            width,
-            height: grey.height,
-            data: grey.data.par_iter().map(|&value| [value; 3]).collect(),
-        },
-        Albedo::Rgb(rgb) => rgb,
-    };
-    if let Some(matrix) = &color.camera_to_linear_srgb {
-        convert(&mut albedo, matrix);
+    let coloured = colour(albedo, &normal, &mask, color, (outputs, kind));
+    Finished {
+        normal,
+        albedo: coloured.albedo,
+        shade: coloured.shade,
+        confidence: expected_error_deg,
+        mask,
+        albedo_report: coloured.report,
+        said: coloured.said,
     }
-    Finished { normal, albedo, confidence: expected_error_deg, mask }
 }
 
 /// Makes photosites unsolved whose normal, albedo or error left the range of float32: files hold no NaN and no infinity.
@@ -74,6 +75,8 @@ pub(super) fn leave_out_what_is_not_finite(maps: &mut Finished) -> Option<String
             usize::from(std::mem::replace(mask, 0) != 0)
         })
         .sum();
+    let shade = maps.shade.data.par_iter_mut().zip(&maps.mask.data);
+    shade.filter(|(_, mask)| **mask == 0).for_each(|(shade, _)| *shade = 0.0);
     (left_out > 0).then(|| {
         format!(
             "{left_out} photosites gave numbers that a map cannot hold and were left out; check exposures, \
@@ -131,16 +134,22 @@ pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
     let mut out = Finished {
         normal: Image::filled(width, height, [0.0; 3]),
         albedo: Image::filled(maps.albedo.width, maps.albedo.height, [0.0; 3]),
+        shade: Image::filled(maps.shade.width, maps.shade.height, 0.0),
         confidence: Image::filled(width, height, 0.0),
         mask: Image::filled(width, height, 0),
+        albedo_report: maps.albedo_report.clone(),
+        said: maps.said.clone(),
     };
-    let Finished { normal, albedo, confidence, mask } = &mut out;
-    // Without an albedo its rows are empty.
+    let Finished { normal, albedo, shade, confidence, mask, .. } = &mut out;
+    // Without an albedo or a shade their rows are empty.
     let mut albedo_rows: Vec<&mut [[f32; 3]]> = albedo.data.chunks_mut(width).collect();
     albedo_rows.resize_with(height, || &mut []);
-    let rows = normal.data.par_chunks_mut(width).zip(albedo_rows);
+    let mut shade_rows: Vec<&mut [f32]> = shade.data.chunks_mut(width).collect();
+    shade_rows.resize_with(height, || &mut []);
+    let colours: Vec<_> = albedo_rows.into_iter().zip(shade_rows).collect();
+    let rows = normal.data.par_chunks_mut(width).zip(colours);
     let rows = rows.zip(confidence.data.par_chunks_mut(width)).zip(mask.data.par_chunks_mut(width));
-    rows.enumerate().for_each(|(v, (((normal, albedo), confidence), mask))| {
+    rows.enumerate().for_each(|(v, (((normal, (albedo, shade)), confidence), mask))| {
         for u in 0..width {
             let Some(taps) = taps_of_undistorted(&maps.mask, camera, &projector, [u, v]) else {
                 continue;
@@ -151,6 +160,9 @@ pub(crate) fn undistort(maps: &Finished, camera: &Camera) -> Finished {
                 normal[u] = (mean_normal / length).into();
                 if let Some(albedo) = albedo.get_mut(u) {
                     *albedo = taps.mean(&maps.albedo);
+                }
+                if let Some(shade) = shade.get_mut(u) {
+                    *shade = taps.mean_of(|at| [maps.shade.data[at], 0.0, 0.0])[0];
                 }
                 confidence[u] = taps.mean_of(|at| [maps.confidence.data[at], 0.0, 0.0])[0];
                 mask[u] = 255;

@@ -32,6 +32,28 @@ pub struct Options {
     pub reuse: Reuse,
     /// Whether what the fit leaves over of each light is written too.
     pub residuals: Residuals,
+    /// What the albedo means.
+    pub albedo: AlbedoKind,
+}
+
+/// What the albedo means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AlbedoKind {
+    /// Reflectance: the shading of relief that the sensor does not resolve is divided out, and kept beside it.
+    #[default]
+    Reflectance,
+    /// With that shading: with one normal a pixel this gives the photographs back.
+    Appearance,
+}
+
+impl AlbedoKind {
+    /// As a report and the command line have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reflectance => "reflectance",
+            Self::Appearance => "appearance",
+        }
+    }
 }
 
 /// What becomes of what the fit leaves over.
@@ -65,6 +87,8 @@ pub struct Outputs {
     pub normal: bool,
     /// `albedo.exr`.
     pub albedo: bool,
+    /// `shade.exr`.
+    pub shade: bool,
     /// `confidence.exr`.
     pub confidence: bool,
     /// `normal.png` and `albedo.png`, of those maps that are made.
@@ -73,9 +97,11 @@ pub struct Outputs {
 
 impl Outputs {
     /// Every map.
-    pub const ALL: Self = Self { normal: true, albedo: true, confidence: true, png: true };
+    pub const ALL: Self =
+        Self { normal: true, albedo: true, shade: true, confidence: true, png: true };
     /// No map.
-    pub const NONE: Self = Self { normal: false, albedo: false, confidence: false, png: false };
+    pub const NONE: Self =
+        Self { normal: false, albedo: false, shade: false, confidence: false, png: false };
 }
 
 /// What to do where the same solution stands already.
@@ -130,6 +156,7 @@ impl Options {
             device: Device::Cpu,
             reuse: Reuse::IfCurrent,
             residuals: Residuals::Leave,
+            albedo: AlbedoKind::Reflectance,
         }
     }
 }

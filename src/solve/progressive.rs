@@ -3,7 +3,7 @@
 use super::finish::{Finished, finish};
 use super::in_memory::solve_scene;
 use super::maps::Counts;
-use super::options::Outputs;
+use super::options::{AlbedoKind, Outputs};
 use super::preview::Scale;
 use super::scene::Scene;
 use super::{Progress, SolveError};
@@ -56,8 +56,11 @@ fn level(
     method: Method,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Level, SolveError> {
-    let (maps, warnings) = solve_scene(scene, method, progress)?;
+    let (maps, mut warnings) = solve_scene(scene, method, progress)?;
     let counts = maps.counts;
-    let maps = finish(maps, &scene.color, Outputs::ALL);
+    let mut maps = finish(maps, &scene.color, Outputs::ALL, AlbedoKind::Reflectance);
+    if scale == Scale::Full {
+        warnings.append(&mut maps.said);
+    }
     Ok(Level { scale, maps, counts, camera: scene.camera.clone(), warnings })
 }

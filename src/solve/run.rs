@@ -142,8 +142,15 @@ fn make(
     let residuals = residuals.map(|files| files.finish(undistorted)).transpose()?;
     let counts = maps.counts;
     let shown = page.is_some();
-    let wanted = Outputs { albedo: options.outputs.albedo || shown, ..options.outputs };
-    let mut maps = finish(maps, &rest.color, wanted);
+    let wanted = Outputs {
+        albedo: options.outputs.albedo || shown,
+        shade: options.outputs.shade || shown,
+        ..options.outputs
+    };
+    let mut maps = finish(maps, &rest.color, wanted, options.albedo);
+    if options.scale == Scale::Full {
+        warnings.append(&mut maps.said);
+    }
     warnings.extend(leave_out_what_is_not_finite(&mut maps));
     let finished = on_grid(maps, rest.camera.as_ref(), options.grid);
     watch.lap(Stage::Colour);
@@ -297,6 +304,8 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
             normal: rest.plane.normal.into_inner().into(),
         },
         color_space: color_space(&rest.color).to_owned(),
+        albedo: (!maps.albedo.data.is_empty() || !maps.shade.data.is_empty())
+            .then(|| maps.albedo_report.clone()),
         residuals: vec![],
         warnings: vec![],
         inputs: vec![],

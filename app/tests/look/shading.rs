@@ -5,7 +5,7 @@ use eframe::egui;
 use egui_kittest::Harness;
 use nalgebra::{Point3, UnitVector3, Vector3};
 use weavelight_app::rooms::look::view::{
-    Appearance, Geometry, MapView, Maps, Mode, Viewport, install, scales, shade, sun,
+    Appearance, Geometry, MapView, Maps, Mode, Viewport, install, scales, shade, sun, surface,
 };
 use weavelight_calibration::description::{Camera, Light, Plane, PointLight};
 
@@ -25,6 +25,16 @@ fn albedo(k: usize) -> [f32; 3] {
     [0.15 + 0.01 * (k % 37) as f32, 0.4, 0.9 - 0.015 * (k % 23) as f32]
 }
 
+/// What was divided out of it.
+fn divided_out(k: usize) -> f32 {
+    0.5 + 0.03 * (k % 17) as f32
+}
+
+/// What a light meets.
+fn seen(k: usize) -> [f32; 3] {
+    albedo(k).map(|c| c * divided_out(k))
+}
+
 fn geometry() -> Geometry {
     let camera = Camera {
         width_px: SIZE[0],
@@ -40,7 +50,8 @@ fn geometry() -> Geometry {
 }
 
 fn screen_of(appearance: Appearance) -> impl Fn(usize, usize) -> [i32; 3] {
-    let maps = Maps::new(geometry(), &normal, &|k| k as f32 / 300.0, &albedo);
+    let surface = surface(SIZE, &normal, &|k| k as f32 / 300.0);
+    let maps = Maps::over(surface, &albedo, &divided_out, geometry());
     let mut view = MapView::default();
     view.go_to(Viewport { centre: SIZE.map(|c| c as f64 / 2.0), zoom: ZOOM });
     let size = SIZE.map(|c| c as f32 * ZOOM);
@@ -97,7 +108,7 @@ fn every_light_shades_as_in_plain_code() {
         check(name, appearance, |k| {
             let point = geometry.on_plane([(k % SIZE[0]) as f64, (k / SIZE[0]) as f64]);
             let eye = geometry.eye_mm();
-            shade::on_screen(shade::relit(&plain, normal(k), albedo(k), &point, &eye))
+            shade::on_screen(shade::relit(&plain, normal(k), seen(k), &point, &eye))
         });
     }
 }

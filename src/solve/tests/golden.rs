@@ -39,6 +39,13 @@ fn spoilt(recipe: Recipe, noise_known: bool) -> Scene {
     made
 }
 
+/// A mosaic of which a window of the colours' method is a part, with noise.
+fn wide() -> Scene {
+    let mut made = scene(Recipe { width: 160, height: 150, ..Recipe::default() });
+    add_noise(&mut made, 40_000.0 / 64_400.0);
+    made
+}
+
 /// Sums in which every photosite has a weight of its own, so that nothing cancels.
 fn sums(values: impl Iterator<Item = f32>) -> [f64; 2] {
     let weighted =
@@ -51,6 +58,7 @@ fn lines() -> Vec<String> {
     let scenes = [
         ("mosaic", spoilt(all, true)),
         ("mosaic, noise unknown", spoilt(Recipe::default(), false)),
+        ("mosaic with windows", wide()),
         ("colour", spoilt(Recipe { layout: Layout::Rgb, seed: 3, ..all }, true)),
         ("grey, two exposures", spoilt(Recipe { layout: Layout::Grey, exposures: 2, ..all }, true)),
     ];
@@ -59,13 +67,14 @@ fn lines() -> Vec<String> {
         for method in [Method::LeastSquares, Method::Weighted, Method::Robust, Method::Auto] {
             let (maps, _) = solve_scene(scene, method, &|_| {}).unwrap();
             let outcomes = maps.counts.outcomes.map(|count| count.to_string()).join(" ");
-            let finished = finish(maps, &scene.color, Outputs::ALL);
+            let finished = finish(maps, &scene.color, Outputs::ALL, AlbedoKind::Reflectance);
             let flat = undistort(&finished, scene.camera.as_ref().unwrap());
             let mut line = format!("{name}, {}: {outcomes};", method_name(method));
             for maps in [&finished, &flat] {
                 for [sum, size] in [
                     sums(maps.normal.data.iter().flatten().copied()),
                     sums(maps.albedo.data.iter().flatten().copied()),
+                    sums(maps.shade.data.iter().copied()),
                     sums(maps.confidence.data.iter().copied()),
                 ] {
                     let _ = write!(line, " {sum:.6}/{size:.6}");

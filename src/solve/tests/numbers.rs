@@ -16,7 +16,7 @@ fn check(what: &str, scene: &Scene) -> usize {
     for method in METHODS {
         let Ok((maps, _)) = solve_scene(scene, method, &|_| {}) else { continue };
         assert!(maps.counts.residual_rms().is_finite(), "{what} {method:?}: residual");
-        let mut maps = finish(maps, &scene.color, Outputs::ALL);
+        let mut maps = finish(maps, &scene.color, Outputs::ALL, AlbedoKind::Reflectance);
         leave_out_what_is_not_finite(&mut maps);
         let vectors = maps.normal.data.iter().zip(&maps.albedo.data).zip(&maps.confidence.data);
         for (at, ((normal, albedo), error)) in vectors.enumerate() {

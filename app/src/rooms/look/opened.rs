@@ -10,7 +10,9 @@ use std::sync::Arc;
 use weavelight::files::FileError;
 use weavelight::instrument::{CalibratedLight, Calibration};
 use weavelight::raster::{Exr, read_exr};
-use weavelight::solution::{ALBEDO_EXR, CAMERA_TOML, CONFIDENCE_EXR, NORMAL_EXR, Solution};
+use weavelight::solution::{
+    ALBEDO_EXR, CAMERA_TOML, CONFIDENCE_EXR, NORMAL_EXR, SHADE_EXR, Solution,
+};
 use weavelight_calibration::description::{Camera, Plane};
 
 /// A solution with what belongs to it.
@@ -111,7 +113,15 @@ pub(super) fn open(
     let geometry = Geometry::new(surface.size(), camera_of(folder)?, plane, 1);
     let albedo = read_map(folder, ALBEDO_EXR, Some(surface.size()))?;
     let [r, g, b] = channels(&albedo, &folder.join(ALBEDO_EXR), ["R", "G", "B"])?;
-    let maps = Maps::over(surface, &|k| [r[k], g[k], b[k]], geometry);
+    // Solutions from before it was written have their albedo as it appears.
+    let shade = match folder.join(SHADE_EXR).exists() {
+        true => Some(read_map(folder, SHADE_EXR, Some(surface.size()))?),
+        false => None,
+    };
+    let shade = shade.as_ref().map(|map| channels(map, &folder.join(SHADE_EXR), ["Y"]));
+    let shade = shade.transpose()?.map(|[shade]| shade);
+    let shade = |k: usize| shade.map_or(1.0, |shade| shade[k]);
+    let maps = Maps::over(surface, &|k| [r[k], g[k], b[k]], &shade, geometry);
     tell(0.9, "");
     let frames = capture_of(folder, place, &report);
     Ok(Opened {

@@ -11,7 +11,7 @@ use weavelight::solve::preview::Preview;
 pub struct Maps {
     /// Normals, expected errors and what is solved; see [`Sample`].
     pub surface: Arc<Pyramid>,
-    /// Linear RGB, times the covered share; the covered share.
+    /// Linear RGB; what was divided out of it; all times the covered share, which the surface holds.
     pub albedo: Arc<Pyramid>,
     /// Where the pixels are.
     pub geometry: Arc<Geometry>,
@@ -26,6 +26,8 @@ pub struct Sample {
     pub error_deg: f32,
     /// Linear RGB.
     pub albedo: [f32; 3],
+    /// What the albedo is to be multiplied by for the picture under a light; 1 where nothing was divided out.
+    pub shade: f32,
 }
 
 impl Sample {
@@ -45,13 +47,14 @@ impl Maps {
         albedo: &(impl Fn(usize) -> [f32; 3] + Sync),
     ) -> Self {
         let size = geometry.size();
-        Self::over(surface(size, normal, error_deg), albedo, geometry)
+        Self::over(surface(size, normal, error_deg), albedo, &|_| 1.0, geometry)
     }
 
-    /// Maps over a surface that is there already.
+    /// Maps over a surface that is there already; `shade` is what was divided out of the albedo.
     pub fn over(
         surface: Arc<Pyramid>,
         albedo: &(impl Fn(usize) -> [f32; 3] + Sync),
+        shade: &(impl Fn(usize) -> f32 + Sync),
         geometry: Geometry,
     ) -> Self {
         let [width, _] = surface.size();
@@ -59,7 +62,7 @@ impl Maps {
             Some(texel) => texel[3].to_f32(),
             None => 0.0,
         };
-        let albedo = picture(surface.size(), albedo, &covered);
+        let albedo = under_light(surface.size(), albedo, shade, &covered);
         Self { surface, albedo, geometry: Arc::new(geometry) }
     }
 
@@ -77,8 +80,8 @@ impl Maps {
     /// What a pixel says; `None` outside and where nothing is solved. Half precision: normals to 0.03 degrees.
     pub fn sample(&self, x: usize, y: usize) -> Option<Sample> {
         let (normal, error_deg) = normal_of(self.surface.texel(x, y)?)?;
-        let [r, g, b, _] = self.albedo.texel(x, y)?.map(f16::to_f32);
-        Some(Sample { normal, error_deg, albedo: [r, g, b] })
+        let [r, g, b, shade] = self.albedo.texel(x, y)?.map(f16::to_f32);
+        Some(Sample { normal, error_deg, albedo: [r, g, b], shade })
     }
 
     /// Bytes held.
@@ -104,14 +107,32 @@ pub fn surface(
     })
 }
 
+/// A picture in linear RGB, and a value beside it in place of the covered share.
+fn under_light(
+    [width, height]: [usize; 2],
+    rgb: &(impl Fn(usize) -> [f32; 3] + Sync),
+    shade: &(impl Fn(usize) -> f32 + Sync),
+    covered: &(impl Fn(usize) -> f32 + Sync),
+) -> Arc<Pyramid> {
+    let value = |x: usize, y: usize| {
+        let (k, share) = (y * width + x, covered(y * width + x));
+        let [r, g, b] = rgb(k).map(|value| finite(value) * share);
+        [r, g, b, finite(shade(k)) * share]
+    };
+    Pyramid::new([width, height], &value, |texel| texel.map(f16::from_f32))
+}
+
+/// Half precision ends at 65504.
+fn finite(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(-6e4, 6e4) } else { 0.0 }
+}
+
 /// A picture in linear RGB.
 pub fn picture(
     [width, height]: [usize; 2],
     rgb: &(impl Fn(usize) -> [f32; 3] + Sync),
     covered: &(impl Fn(usize) -> f32 + Sync),
 ) -> Arc<Pyramid> {
-    // Half precision ends at 65504.
-    let finite = |value: f32| if value.is_finite() { value.clamp(-6e4, 6e4) } else { 0.0 };
     let value = |x: usize, y: usize| {
         let (k, share) = (y * width + x, covered(y * width + x));
         let [r, g, b] = rgb(k).map(|value| finite(value) * share);
@@ -145,7 +166,12 @@ mod tests {
         assert_eq!((maps.sample(0, 0), maps.sample(300, 0)), (None, None));
         let sample = maps.sample(7, 1).unwrap();
         assert!((0..3).all(|c| (sample.normal[c] - tilted[c]).abs() < 5e-4), "{sample:?}");
-        assert_eq!((sample.error_deg, sample.albedo), (1.5, [0.25, 0.5, 1.0]));
+        assert_eq!((sample.error_deg, sample.albedo, sample.shade), (1.5, [0.25, 0.5, 1.0], 1.0));
+        let surface = maps.surface.clone();
+        let geometry = Geometry::new([300, 2], None, Plane::table(), 1);
+        let shaded = Maps::over(surface, &|_| [0.25, 0.5, 1.0], &|_| 0.75, geometry);
+        assert_eq!(shaded.sample(7, 1).unwrap().shade, 0.75);
+        assert_eq!(shaded.sample(7, 1).unwrap().albedo, [0.25, 0.5, 1.0]);
         assert!((sample.slope_deg() - 50.208).abs() < 0.05, "{}", sample.slope_deg());
     }
 }

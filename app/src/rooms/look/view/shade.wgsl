@@ -153,9 +153,13 @@ fn side(mode: f32, surface: vec4f, albedo: vec4f, picture: vec4f, pixel: vec2f) 
     let picture_rgb = picture.rgb / max(picture.w, 1e-4);
     switch i32(mode) {
         case 0: { return coded_side(0.5 * normal + 0.5, surface.w); }
-        case 1: { return linear_side(albedo.rgb / max(albedo.w, 1e-4), albedo.w); }
+        case 1: { return linear_side(albedo.rgb / max(surface.w, 1e-4), surface.w); }
         case 2: { return coded_side(scale_at(surface.z / max(surface.w, 1e-4) / view.scales.x, 0.0), surface.w); }
-        case 3: { return linear_side(relit(normal, albedo.rgb / max(albedo.w, 1e-4), point_mm(pixel)), surface.w); }
+        case 3: {
+            // What was divided out of the albedo goes back in: w holds it, times the covered share.
+            let seen = albedo.rgb * albedo.w / max(surface.w * surface.w, 1e-6);
+            return linear_side(relit(normal, seen, point_mm(pixel)), surface.w);
+        }
         case 4: { return coded_side(scale_at(degrees(acos(clamp(normal.z, -1.0, 1.0))) / view.scales.y, 0.0), surface.w); }
         case 5: { return linear_side(picture_rgb * view.modes.w, picture.w); }
         case 6: { return coded_side(scale_at(0.5 + 0.5 * picture_rgb.r / view.scales.w, 1.0), picture.w); }

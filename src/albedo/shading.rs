@@ -1,0 +1,380 @@
+//! How dark relief makes a photosite, from the scan itself: log albedo regressed on features of the normals, window by
+//! window, and whether the channels agree about it. Where they do not, it is dye and not shade.
+
+use super::features::{FEATURES, FeatureRow};
+use super::gram::{Coefficients, Gram, Samples, TERMS};
+use super::grid::Grid;
+use super::numeric::{ln, quantile, smoothstep};
+use super::relief::Relief;
+use rayon::prelude::*;
+use weavelight_calibration::description::{Cfa, Image};
+
+/// Cells of the grid; windows are twice as wide.
+const CELL: usize = 256;
+const RIDGE: f64 = 1e-3;
+/// Solves, each with weights from the one before.
+const PASSES: usize = 3;
+/// Residuals beyond this many standard deviations count less (Huber).
+const HUBER: f32 = 2.0;
+/// Fewer photosites of a channel than this do not tell.
+const FEWEST: usize = 1024;
+/// Share of photosites that are darker than the crowns of the yarns, where no light is lost.
+const CROWNS: f64 = 0.9;
+/// Below this roughness cloth is flat, above the second it is not.
+const FLAT: [f32; 2] = [0.0016, 0.0024];
+/// Differences between what relief says of the channels (RMS of logs): one dye below, several above.
+const DYES: [f32; 2] = [0.012, 0.022];
+/// Channels that correlate less than this run against each other.
+const AGAINST: f64 = -0.3;
+
+/// What a window says.
+#[derive(Clone, Debug)]
+pub(super) struct Window {
+    /// Mean over the channels, times the share that is shade.
+    shade: Coefficients,
+    /// What to take from it, so that it is 0 at the crowns.
+    crowns: f64,
+    /// 0: one dye; 1: several.
+    pub(super) several: f32,
+    /// Median roughness of the normals.
+    pub(super) rough: f32,
+    /// Of each channel.
+    pub(super) channels: [Coefficients; 3],
+    /// Correlation between what relief says of two channels.
+    pub(super) correlation: [[f64; 3]; 3],
+    /// -1: the channel runs against the one that varies most.
+    pub(super) signs: [f32; 3],
+    /// Residual of each channel, a share of its spread.
+    pub(super) unexplained: [f32; 3],
+    /// How far the crowns stand out of the rest, in logs.
+    pub(super) contrast: f32,
+    /// What of the crowns' place is not known.
+    pub(super) known: bool,
+}
+
+/// Shading of the whole picture.
+pub(super) struct Shading {
+    pub(super) grid: Grid,
+    pub(super) windows: Vec<Window>,
+}
+
+/// Photosites of a cell that take part.
+struct Cell {
+    channels: [Samples; 3],
+    rough: Vec<f32>,
+    /// Standard deviation of the residuals.
+    residual: [f32; 3],
+}
+
+/// Rows of which two take part, so that each part of the mosaic's cell does; more where the picture is small.
+fn rows_apart(size: [usize; 2]) -> usize {
+    match size[0] * size[1] {
+        0..1_000_000 => 2,
+        1_000_000..3_000_000 => 4,
+        3_000_000..8_000_000 => 8,
+        _ => 16,
+    }
+}
+
+impl Shading {
+    /// Estimates it; windows without enough photosites say nothing.
+    pub(super) fn estimate(
+        guarded: &Image<f32>,
+        cfa: Cfa,
+        normal: &Image<[f32; 3]>,
+        mask: &Image<u8>,
+    ) -> Self {
+        let size = [guarded.width, guarded.height];
+        let grid = Grid::new(size, CELL);
+        let apart = rows_apart(size);
+        let places: Vec<[usize; 2]> = (0..grid.x.cells() * grid.y.cells())
+            .map(|k| [k % grid.x.cells(), k / grid.x.cells()])
+            .collect();
+        let mut cells: Vec<Cell> = places
+            .par_iter()
+            .map(|place| sample(guarded, cfa, normal, mask, &grid, *place, apart))
+            .collect();
+        let mut found: Vec<[Option<Coefficients>; 3]> = vec![[None; 3]; grid.nodes()];
+        let mut equal = Vec::new();
+        for pass in 0..PASSES {
+            if pass > 0 {
+                cells.par_iter_mut().zip(&places).for_each(|(cell, place)| {
+                    cell.weigh(&mean_around(&grid, &found, *place));
+                });
+            }
+            let grams: Vec<[Gram; 3]> = cells
+                .par_iter()
+                .map(|cell| [0, 1, 2].map(|c| Gram::of(&cell.channels[c])))
+                .collect();
+            let sums: Vec<[Gram; 3]> =
+                (0..grid.nodes()).map(|node| sum_of(&grid, &grams, node)).collect();
+            found = sums.par_iter().map(|sum| [0, 1, 2].map(|c| sum[c].fit(RIDGE))).collect();
+            if pass == 0 {
+                equal = sums;
+            }
+        }
+        let windows = (0..grid.nodes())
+            .into_par_iter()
+            .map(|node| Window::new(&grid, node, &cells, &equal[node], &found[node]))
+            .collect();
+        Self { grid, windows }
+    }
+
+    /// Whether no window could be fitted.
+    pub(super) fn is_unknown(&self) -> bool {
+        self.windows.iter().all(|window| !window.known)
+    }
+
+    /// One value a window, blended to a place.
+    pub(super) fn several_at(&self, place: [usize; 2]) -> f32 {
+        let values: Vec<f32> = self.windows.iter().map(|window| window.several).collect();
+        self.grid.blend(&values, place)
+    }
+
+    /// The window nearest to a place.
+    pub(super) fn nearest(&self, [x, y]: [usize; 2]) -> &Window {
+        let node = self.grid.y.nearest(y) * self.grid.x.nodes() + self.grid.x.nearest(x);
+        &self.windows[node]
+    }
+
+    /// The log of the shade in row `y` into `out`.
+    pub(super) fn row(&self, y: usize, features: &FeatureRow, out: &mut [f32]) {
+        let ([top, bottom], v) = self.grid.y.between(y);
+        let columns = self.grid.x.nodes();
+        let between = |column: usize| {
+            let a = self.windows[top * columns + column].line();
+            let b = self.windows[bottom * columns + column].line();
+            std::array::from_fn(|k| (a[k] + (b[k] - a[k]) * f64::from(v)) as f32)
+        };
+        for span in self.grid.x.spans(usize::MAX / 2) {
+            let first: Line = between(span.nodes[0]);
+            let second: Line = between(span.nodes[1]);
+            let change: Line = std::array::from_fn(|k| second[k] - first[k]);
+            let start = span.places.start;
+            for (k, out) in out[span.places.clone()].iter_mut().enumerate() {
+                let x = start + k;
+                let share = span.first + span.step * k as f32;
+                let (mut a, mut b) = (first[TERMS], change[TERMS]);
+                for (f, values) in features.values.iter().enumerate() {
+                    let value = values[x];
+                    a += value * (first[f] + value * first[FEATURES + f]);
+                    b += value * (change[f] + value * change[FEATURES + f]);
+                }
+                *out = bounded(a + share * b, features.rough[x]);
+            }
+        }
+    }
+}
+
+/// Shade takes light away, and not more than the spread of the normals lets it.
+fn bounded(log_shade: f32, rough: f32) -> f32 {
+    log_shade.min(0.0).max(-4.0 * rough.max(0.0))
+}
+
+/// Coefficients of the terms, then a constant.
+type Line = [f32; TERMS + 1];
+
+impl Window {
+    fn line(&self) -> [f64; TERMS + 1] {
+        let crowns = self.crowns;
+        std::array::from_fn(|k| if k < TERMS { self.shade[k] } else { -crowns })
+    }
+
+    fn unknown(rough: f32) -> Self {
+        Self {
+            shade: Coefficients::zeros(),
+            crowns: 0.0,
+            several: 0.0,
+            rough,
+            channels: [Coefficients::zeros(); 3],
+            correlation: [[1.0; 3]; 3],
+            signs: [1.0; 3],
+            unexplained: [1.0; 3],
+            contrast: 0.0,
+            known: false,
+        }
+    }
+
+    fn new(
+        grid: &Grid,
+        node: usize,
+        cells: &[Cell],
+        equal: &[Gram; 3],
+        found: &[Option<Coefficients>; 3],
+    ) -> Self {
+        let [column, row] = grid.place_of(node);
+        let inside: Vec<&Cell> = cells_of(grid, [column, row]).map(|k| &cells[k]).collect();
+        let mut rough: Vec<f32> = inside.iter().flat_map(|cell| cell.rough.clone()).collect();
+        let rough = quantile(&mut rough, 0.5).unwrap_or(0.0);
+        let count = [0, 1, 2].map(|c| inside.iter().map(|cell| cell.channels[c].len()).sum());
+        let &[Some(r), Some(g), Some(b)] = found else { return Self::unknown(rough) };
+        if count.iter().any(|&count: &usize| count < FEWEST) {
+            return Self::unknown(rough);
+        }
+        let channels = [r, g, b];
+        let residual = [0, 1, 2].map(|c| {
+            let of = |cell: &&Cell| cell.channels[c].len() as f32 * cell.residual[c].powi(2);
+            (inside.iter().map(of).sum::<f32>() / count[c] as f32).sqrt()
+        });
+        let mut all = Gram::none();
+        equal.iter().for_each(|gram| all.add(gram));
+        let covariance = all.covariance();
+        let product = |a: &Coefficients, b: &Coefficients| (a.transpose() * covariance * b)[0];
+        let mean = (r + g + b) / 3.0;
+        let apart = channels.iter().map(|c| product(&(c - mean), &(c - mean)).max(0.0));
+        let apart = (apart.sum::<f64>() / 3.0).sqrt() as f32;
+        let noise = (0..3).map(|c| residual[c].powi(2) * TERMS as f32 / count[c] as f32);
+        let noise = (noise.sum::<f32>() / 3.0).sqrt();
+        // A smaller window tells less.
+        let area = grid.x.window(column).len() * grid.y.window(row).len();
+        let smaller = (2.0 * CELL as f32 / (area as f32).sqrt()).clamp(1.0, 4.0);
+        let least = DYES[0] * smaller.powf(1.32);
+        let most = DYES[1] * smaller.powf(1.86);
+        let several = smoothstep(apart, least.max(3.0 * noise), most.max(6.0 * noise));
+        let spread = channels.map(|c| product(&c, &c).max(0.0).sqrt());
+        let correlation = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                product(&channels[i], &channels[j]) / (spread[i] * spread[j] + 1e-12)
+            })
+        });
+        let widest = (0..3).max_by(|a, b| spread[*a].total_cmp(&spread[*b])).unwrap_or(1);
+        let flat = smoothstep(rough, FLAT[0], FLAT[1]);
+        let signs = [0, 1, 2].map(|c| {
+            let against = several > 0.5 && flat > 0.5 && correlation[widest][c] < AGAINST;
+            if against { -1.0 } else { 1.0 }
+        });
+        let mut predicted: Vec<f32> = Vec::new();
+        let mut line = Vec::new();
+        for samples in inside.iter().flat_map(|cell| &cell.channels) {
+            samples.predict(&mean, &mut line);
+            predicted.extend(&line);
+        }
+        let crowns = quantile(&mut predicted, CROWNS).unwrap_or(0.0);
+        let middle = quantile(&mut predicted, 0.5).unwrap_or(0.0);
+        let share = f64::from((1.0 - several) * flat);
+        let total = |c: usize| (residual[c].powi(2) + spread[c].powi(2) as f32).sqrt();
+        Self {
+            shade: mean * share,
+            crowns: f64::from(crowns) * share,
+            several: several * flat,
+            rough,
+            channels,
+            correlation,
+            signs,
+            unexplained: [0, 1, 2].map(|c| residual[c] / total(c).max(1e-6)),
+            contrast: crowns - middle,
+            known: true,
+        }
+    }
+}
+
+impl Cell {
+    /// Weights by how well the coefficients explain each photosite.
+    fn weigh(&mut self, coefficients: &[Option<Coefficients>; 3]) {
+        let mut predicted = Vec::new();
+        for ((samples, coefficients), residual) in
+            self.channels.iter_mut().zip(coefficients).zip(&mut self.residual)
+        {
+            let Some(coefficients) = coefficients else { continue };
+            samples.predict(coefficients, &mut predicted);
+            predicted.iter_mut().zip(&samples.y).for_each(|(p, y)| *p = y - *p);
+            let mut sorted = predicted.clone();
+            let Some(middle) = quantile(&mut sorted, 0.5) else { continue };
+            predicted.iter_mut().for_each(|p| *p = (*p - middle).abs());
+            sorted.copy_from_slice(&predicted);
+            let spread = 1.48 * quantile(&mut sorted, 0.5).unwrap_or(0.0);
+            *residual = spread;
+            let limit = (HUBER * spread).max(1e-6);
+            let weights = samples.weight.iter_mut().zip(&predicted);
+            weights.for_each(|(weight, off)| *weight = 1.0 / (off / limit).max(1.0));
+        }
+    }
+}
+
+fn cells_of(grid: &Grid, [column, row]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let across = grid.x.cells_of(column);
+    let columns = grid.x.cells();
+    grid.y.cells_of(row).flat_map(move |y| across.clone().map(move |x| y * columns + x))
+}
+
+fn sum_of(grid: &Grid, grams: &[[Gram; 3]], node: usize) -> [Gram; 3] {
+    let mut sum = [Gram::none(), Gram::none(), Gram::none()];
+    for cell in cells_of(grid, grid.place_of(node)) {
+        sum.iter_mut().zip(&grams[cell]).for_each(|(sum, gram)| sum.add(gram));
+    }
+    sum
+}
+
+/// Mean of the coefficients of the windows that hold a cell.
+fn mean_around(
+    grid: &Grid,
+    found: &[[Option<Coefficients>; 3]],
+    place: [usize; 2],
+) -> [Option<Coefficients>; 3] {
+    let [x, y] = place;
+    let nodes = |k: usize, count: usize| k.saturating_sub(1)..(k + 1).min(count);
+    [0, 1, 2].map(|c| {
+        let mut sum = Coefficients::zeros();
+        let mut count = 0.0;
+        for row in nodes(y, grid.y.nodes()) {
+            for column in nodes(x, grid.x.nodes()) {
+                if let Some(found) = &found[row * grid.x.nodes() + column][c] {
+                    sum += found;
+                    count += 1.0;
+                }
+            }
+        }
+        (count > 0.0).then(|| sum / count)
+    })
+}
+
+fn sample(
+    guarded: &Image<f32>,
+    cfa: Cfa,
+    normal: &Image<[f32; 3]>,
+    mask: &Image<u8>,
+    grid: &Grid,
+    [column, row]: [usize; 2],
+    apart: usize,
+) -> Cell {
+    let mut cell = Cell {
+        channels: std::array::from_fn(|_| Samples::default()),
+        rough: Vec::new(),
+        residual: [0.0; 3],
+    };
+    let (across, along) = (grid.x.cell(column), grid.y.cell(row));
+    let mut features = FeatureRow::new(across.len());
+    let whole = |x: usize, y: usize| {
+        let rows = y.saturating_sub(1)..(y + 2).min(mask.height);
+        rows.into_iter().all(|v| {
+            let columns = x.saturating_sub(1)..(x + 2).min(mask.width);
+            mask.data[v * mask.width..][columns].iter().all(|solved| *solved != 0)
+        })
+    };
+    for (pair, start) in along.clone().step_by(apart).enumerate() {
+        // Where a pair of rows starts changes from pair to pair: a weave's own period does not hide from it.
+        let start = start + (pair * 5 % 4 * apart / 4) / 2 * 2;
+        let end = (start + 2).min(along.end);
+        if start >= end {
+            continue;
+        }
+        let relief = Relief::of_part(normal, mask, across.clone(), start..end);
+        for y in start..end {
+            features.fill(&relief, y - start);
+            for (k, x) in across.clone().enumerate() {
+                let value = guarded.data[y * guarded.width + x];
+                if value <= 0.0 || !whole(x, y) {
+                    continue;
+                }
+                let samples = &mut cell.channels[cfa.channel(x, y) as usize];
+                for (all, values) in samples.features.iter_mut().zip(&features.values) {
+                    all.push(values[k]);
+                }
+                samples.y.push(ln(value));
+                samples.weight.push(1.0);
+                cell.rough.push(features.rough[k]);
+            }
+        }
+    }
+    cell
+}
