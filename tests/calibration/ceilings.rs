@@ -54,7 +54,7 @@ fn a_sheet_that_clips_unseen_at_12_bits_is_overexposed() {
 fn a_few_samples_that_clip_at_12_bits_are_left_out_and_told() {
     let bench = Bench::new(&[Part::WhiteFlat], |_| ());
     bench.know(&["camera.toml"]);
-    converted(&bench, "white-flat", 1.12 * CEILING);
+    converted(&bench, "white-flat", 1.06 * CEILING);
     let report = bench.lights(&["white-flat"]).unwrap();
     let told = |what: &str| report.warnings.iter().any(|warning| warning.contains(what));
     assert!(told("white-flat: The pictures clip at 4095 (12 bits"), "{:?}", report.warnings);
