@@ -35,6 +35,8 @@ fn first_on(screen: Vec2) -> Vec2 {
 pub struct Geometry {
     /// The screen is still to be asked for the first size.
     first: bool,
+    /// There is a screen; not every frame says so.
+    on_screen: bool,
     /// It is to be maximised as it was, once it is on the screen.
     maximizes: bool,
     /// The number of the first frame.
@@ -58,6 +60,7 @@ impl Geometry {
     pub fn new(settings: &Settings) -> Self {
         Self {
             first: settings.window_size.is_none(),
+            on_screen: false,
             maximizes: settings.maximized,
             first_frame: None,
             size: Vec2::ZERO,
@@ -94,7 +97,7 @@ impl Geometry {
             };
             (seen, window.monitor_size.map(|points| points * scale))
         });
-        let real = screen.is_some();
+        self.on_screen |= screen.is_some();
         if let Some(screen) = screen.filter(|screen| self.first && screen.min_elem() > 0.0) {
             self.first = false;
             if !seen.maximized {
@@ -105,7 +108,7 @@ impl Geometry {
         if self.maximizes {
             return self.maximize(ctx, &seen);
         }
-        if !self.remember(&seen, settings) && real {
+        if !self.remember(&seen, settings) && self.on_screen {
             // A window that nothing happens in draws no frame.
             ctx.request_repaint_after_secs(SETTLED_S as f32);
         }
