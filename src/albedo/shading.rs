@@ -293,12 +293,8 @@ impl Window {
         let apart = (apart.sum::<f64>() / 3.0).sqrt() as f32;
         let noise = (0..3).map(|c| residual[c].powi(2) * TERMS as f32 / count[c] as f32);
         let noise = (noise.sum::<f32>() / 3.0).sqrt();
-        // A smaller window tells less.
         let area = grid.x.window(column).len() * grid.y.window(row).len();
-        let smaller = (2.0 * CELL as f32 / (area as f32).sqrt()).clamp(1.0, 4.0);
-        let least = DYES[0] * smaller.powf(1.32);
-        let most = DYES[1] * smaller.powf(1.86);
-        let several = smoothstep(apart, least.max(3.0 * noise), most.max(6.0 * noise));
+        let several = several_dyes(apart, noise, area);
         let spread = channels.map(|c| product(&c, &c).max(0.0).sqrt());
         let correlation: [[f64; 3]; 3] = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
@@ -311,27 +307,13 @@ impl Window {
             let against = several > 0.5 && flat > 0.5 && correlation[widest][c] < AGAINST;
             if against { -1.0 } else { 1.0 }
         });
-        let mut predicted: Vec<f32> = Vec::new();
-        let mut line = Vec::new();
-        for samples in inside.iter().flat_map(|cell| &cell.channels) {
-            samples.predict(&mean, &mut line);
-            predicted.extend(&line);
-        }
-        let crowns = quantile(&mut predicted, CROWNS).unwrap_or(0.0);
-        let middle = quantile(&mut predicted, 0.5).unwrap_or(0.0);
+        let [crowns, middle] = crowns_and_middle(&inside, &mean);
         let share = f64::from((1.0 - several) * flat);
         let deviation = [0, 1, 2].map(|c| equal[c].deviation() as f32);
         let trust = match several > 0.5 && flat > 0.5 {
             true => trust(&correlation, &deviation),
             false => [[1.0; 3]; 3],
         };
-        let by_relief = [0, 1, 2].map(|c| {
-            let pairs = inside.iter().map(|cell| &cell.neighbours[c]);
-            let apart = (1.0 - Neighbours::correlation(pairs).powi(2)).max(1e-3);
-            // Fourth powers of the shares of the spread that either way leaves over.
-            let unexplained = (residual[c] / deviation[c].max(1e-6)).powi(4);
-            (apart * apart) as f32 / ((apart * apart) as f32 + unexplained)
-        });
         Self {
             shade: mean * share,
             crowns: f64::from(crowns) * share,
@@ -340,12 +322,41 @@ impl Window {
             channels,
             constants: [0, 1, 2].map(|c| equal[c].constant(&channels[c])),
             trust,
-            by_relief,
+            by_relief: by_relief(&inside, &residual, &deviation),
             signs,
             contrast: crowns - middle,
             known: true,
         }
     }
+}
+
+/// Whether relief says different things of the channels, from their distance and its noise; a smaller window tells less.
+fn several_dyes(apart: f32, noise: f32, area: usize) -> f32 {
+    let smaller = (2.0 * CELL as f32 / (area as f32).sqrt()).clamp(1.0, 4.0);
+    let least = DYES[0] * smaller.powf(1.32);
+    let most = DYES[1] * smaller.powf(1.86);
+    smoothstep(apart, least.max(3.0 * noise), most.max(6.0 * noise))
+}
+
+/// What the terms say at the crowns of the yarns, and at the median.
+fn crowns_and_middle(inside: &[&Cell], coefficients: &Coefficients) -> [f32; 2] {
+    let mut predicted: Vec<f32> = Vec::new();
+    let mut line = Vec::new();
+    for samples in inside.iter().flat_map(|cell| &cell.channels) {
+        samples.predict(coefficients, &mut line);
+        predicted.extend(&line);
+    }
+    [CROWNS, 0.5].map(|share| quantile(&mut predicted, share).unwrap_or(0.0))
+}
+
+/// Share of relief beside interpolation, by what either leaves over of a channel's spread (fourth powers).
+fn by_relief(inside: &[&Cell], residual: &[f32; 3], deviation: &[f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|c| {
+        let pairs = inside.iter().map(|cell| &cell.neighbours[c]);
+        let apart = (1.0 - Neighbours::correlation(pairs).powi(2)).max(1e-3);
+        let unexplained = (residual[c] / deviation[c].max(1e-6)).powi(4);
+        (apart * apart) as f32 / ((apart * apart) as f32 + unexplained)
+    })
 }
 
 /// How far a curve leads from each channel to each other: they must rise or fall together, and the second must not vary so
