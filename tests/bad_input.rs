@@ -38,6 +38,7 @@ fn the_faultless_session_is_solved() {
     for name in [
         "normal.exr",
         "albedo.exr",
+        "shade.exr",
         "confidence.exr",
         "normal.png",
         "albedo.png",

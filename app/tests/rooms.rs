@@ -326,9 +326,15 @@ fn the_window_solves_as_the_command_line_does() {
         &rig.join("by-command"),
     );
     weavelight::solve::run(&options, &|_| ()).unwrap();
-    for file in
-        ["normal.exr", "albedo.exr", "confidence.exr", "normal.png", "albedo.png", "mask.png"]
-    {
+    for file in [
+        "normal.exr",
+        "albedo.exr",
+        "shade.exr",
+        "confidence.exr",
+        "normal.png",
+        "albedo.png",
+        "mask.png",
+    ] {
         let read = |folder: &str| std::fs::read(rig.join(folder).join(file)).unwrap();
         assert!(read("by-command") == read("solutions/linen 1"), "{file} differs");
     }

@@ -87,8 +87,19 @@ impl Gram {
         self.sums[(0, k)] / self.count()
     }
 
+    /// What a fit with these coefficients adds to the terms.
+    pub(super) fn constant(&self, coefficients: &Coefficients) -> f64 {
+        let terms: f64 = (0..TERMS).map(|k| coefficients[k] * self.mean(k + 1)).sum();
+        self.mean(COLUMNS - 1) - terms
+    }
+
     fn covariance_of(&self, j: usize, k: usize) -> f64 {
         self.sums[(j, k)] / self.count() - self.mean(j) * self.mean(k)
+    }
+
+    /// Standard deviation of y.
+    pub(super) fn deviation(&self) -> f64 {
+        self.covariance_of(COLUMNS - 1, COLUMNS - 1).max(0.0).sqrt()
     }
 
     /// Between the terms.

@@ -146,14 +146,15 @@ impl Part {
             if self.channel[at] == Channel::G as u8 {
                 continue;
             }
-            let sum = |values: &[f32]| -> f32 {
-                (0..5)
-                    .flat_map(|v| (0..5).map(move |u| (v, u)))
-                    .map(|(v, u)| {
-                        let weight = if u == 2 || v == 2 { 3.0 } else { 1.0 };
-                        weight * values[at + v * stride + u - 2 * stride - 2]
-                    })
-                    .sum()
+            let sum = |values: &[f32]| {
+                let mut sum = 0.0;
+                for v in 0..5 {
+                    let start = at + v * stride - 2 * stride - 2;
+                    for (u, value) in values[start..start + 5].iter().enumerate() {
+                        sum += if u == 2 || v == 2 { 3.0 } else { 1.0 } * value;
+                    }
+                }
+                sum
             };
             let [change_across, change_down] = [sum(&changes[0]), sum(&changes[1])];
             let difference = match change_across <= change_down {
@@ -209,11 +210,13 @@ impl Part {
     fn box_sum(&self, values: &[f32]) -> Vec<f32> {
         let (width, height) = (self.width, self.height);
         let mut across = vec![0.0f32; values.len()];
-        for y in 0..height {
-            let row = &values[y * width..(y + 1) * width];
-            for x in 0..width {
-                let part = x.saturating_sub(GUIDE_REACH)..(x + GUIDE_REACH + 1).min(width);
-                across[y * width + x] = row[part].iter().sum();
+        for (sums, row) in across.chunks_mut(width).zip(values.chunks(width)) {
+            // One shift after the other, so that the additions of a row do not wait for each other.
+            for shift in 0..2 * GUIDE_REACH + 1 {
+                let to = GUIDE_REACH.saturating_sub(shift);
+                let from = shift.saturating_sub(GUIDE_REACH);
+                let shifted = sums.iter_mut().skip(to).zip(&row[from..]);
+                shifted.for_each(|(sum, value)| *sum += value);
             }
         }
         let mut out = vec![0.0f32; values.len()];

@@ -3,22 +3,24 @@
 use super::curve::Curves;
 use super::features::FeatureRow;
 use super::flat::Structure;
-use super::guard::guard;
+use super::guard::{DARKEST, guard};
 use super::interpolate::residual_interpolation;
 use super::numeric::{exp, ln};
 use super::print::{Base, Gate};
 use super::relief::Relief;
-use super::shading::Shading;
+use super::shading::{Shading, Window};
 use rayon::prelude::*;
 use std::ops::Range;
 use weavelight_calibration::description::{Cfa, Channel, Image};
 
 /// Rows that a thread takes at a time.
 const BAND: usize = 32;
-/// Cells of the windows in which one dye's colours are compared; a window holds four.
+/// Cells of the windows in which a cloth's colours are compared; a window holds four.
 const WIDE: usize = 128;
-/// The same for several dyes and for prints.
-const NARROW: usize = 32;
+/// The same for prints.
+const NARROW: usize = 24;
+/// Relative error of the level where the crowns of the yarns are resolved, on simulated cloth.
+const LEVEL_SIGMA: f64 = 0.02;
 /// A side shorter than this has no window of its own.
 const SHORTEST: usize = 128;
 
@@ -54,7 +56,9 @@ pub struct Figures {
     pub several_share: f64,
     /// Share of the picture that is printed.
     pub gated_share: f64,
-    /// Expected relative error of the level.
+    /// How much too low the level may be, relative, as yarns are not resolved or their shade is not told from dye.
+    pub reads_low: f64,
+    /// Expected relative error of the level: with that, what is left where crowns are resolved.
     pub level_sigma: f64,
 }
 
@@ -126,14 +130,15 @@ pub fn find_colours(input: &Input) -> Result<Colours, Refused> {
     let mut shade = Image::filled(input.mosaic.width, input.mosaic.height, 0.0);
     let logs = take_shade_out(&guarded.values, &shading, input.normal, &mask, &mut shade);
     let found = Found::new(&logs, input.cfa, &shading).ok_or(Refused::NoWindow)?;
-    let reflectance = found.colours(&guarded.values, &shade);
-    let windows = shading.windows.len() as f64;
-    let several = shading.windows.iter().map(|window| f64::from(window.several)).sum::<f64>();
+    let reflectance = found.colours(input.normal, &mask, &guarded.values, &shade);
+    let several_share = shading.several_share();
+    let reads_low = shading.reads_low();
     let figures = Figures {
         limited: guarded.limited,
-        several_share: several / windows,
+        several_share,
         gated_share: found.gate.mean(),
-        level_sigma: 0.0,
+        reads_low,
+        level_sigma: LEVEL_SIGMA.hypot(reads_low),
     };
     Ok(Colours { reflectance, shade, figures })
 }
@@ -174,8 +179,9 @@ fn take_shade_out(
 struct Found<'a> {
     logs: &'a Image<f32>,
     cfa: Cfa,
+    shading: &'a Shading,
     wide: Curves,
-    /// Where there are several dyes, or a print near.
+    /// Where there is a print near.
     narrow: Option<Curves>,
     /// Share of the narrow windows, by the wide ones' nodes.
     narrow_share: Vec<f32>,
@@ -192,21 +198,16 @@ struct Print {
 }
 
 impl<'a> Found<'a> {
-    fn new(logs: &'a Image<f32>, cfa: Cfa, shading: &Shading) -> Option<Self> {
+    fn new(logs: &'a Image<f32>, cfa: Cfa, shading: &'a Shading) -> Option<Self> {
         let gate = Gate::of(logs, cfa);
-        let wide = Curves::of(logs, cfa, WIDE, &|_| [1.0; 3], &|_| true)?;
-        let several: Vec<f32> = shading.windows.iter().map(|window| window.several).collect();
+        let signs = |place: [usize; 2]| shading.nearest(place).signs;
+        let wide = Curves::of(logs, cfa, WIDE, &signs, &|_| true)?;
         let share = |node: usize| {
             let [column, row] = wide.grid.place_of(node);
             let (columns, rows) = (wide.grid.x.window(column), wide.grid.y.window(row));
-            if gate.is_open() && gate.touches(&columns, &rows) {
-                return 1.0;
-            }
-            let middle = |range: &Range<usize>| (range.start + range.end) / 2;
-            shading.grid.blend(&several, [middle(&columns), middle(&rows)])
+            if gate.is_open() && gate.touches(&columns, &rows) { 1.0 } else { 0.0 }
         };
         let narrow_share: Vec<f32> = (0..wide.grid.nodes()).map(share).collect();
-        let signs = |place: [usize; 2]| shading.nearest(place).signs;
         let near = |[columns, rows]: [Range<usize>; 2]| {
             wide.grid.y.windows_around(&rows).any(|row| {
                 wide.grid
@@ -219,16 +220,25 @@ impl<'a> Found<'a> {
         let narrow = any.then(|| Curves::of(logs, cfa, NARROW, &signs, &near)).flatten();
         let print = gate.is_open().then(|| Print::new(logs, cfa, &gate, &signs)).flatten();
         let structure = Structure::of(logs, cfa);
-        Some(Self { logs, cfa, wide, narrow, narrow_share, structure, gate, print })
+        Some(Self { logs, cfa, shading, wide, narrow, narrow_share, structure, gate, print })
     }
 
-    fn colours(&self, guarded: &Image<f32>, shade: &Image<f32>) -> Image<[f32; 3]> {
+    fn colours(
+        &self,
+        normal: &Image<[f32; 3]>,
+        mask: &Image<u8>,
+        guarded: &Image<f32>,
+        shade: &Image<f32>,
+    ) -> Image<[f32; 3]> {
         let (width, height) = (self.logs.width, self.logs.height);
         let mut out = Image::filled(width, height, [0.0; 3]);
         out.data.par_chunks_mut(BAND * width).enumerate().for_each(|(band, out)| {
             let rows = band * BAND..((band + 1) * BAND).min(height);
             self.wide.apply(self.logs, self.cfa, rows.clone(), &|_, _| true, out);
             self.mix_narrow(rows.clone(), out);
+            self.mix_relief([normal.width, normal.height], rows.clone(), out, &|columns| {
+                Relief::of_part(normal, mask, columns, rows.clone())
+            });
             self.mix_print(rows.clone(), out);
             for (at, rgb) in (rows.start * width..rows.end * width).zip(out.iter_mut()) {
                 *rgb = if guarded.data[at] > 0.0 { rgb.map(exp) } else { [0.0; 3] };
@@ -261,6 +271,68 @@ impl<'a> Found<'a> {
         for (k, (out, found)) in out.iter_mut().zip(&found).enumerate() {
             if !found[0].is_nan() {
                 mix(out, *found, share(k % width, rows.start + k / width));
+            }
+        }
+    }
+
+    /// Channels that no curve leads to: as relief tells them, or interpolated.
+    fn mix_relief(
+        &self,
+        size: [usize; 2],
+        rows: Range<usize>,
+        out: &mut [[f32; 3]],
+        relief: &dyn Fn(Range<usize>) -> Relief,
+    ) {
+        let columns = self.shading.grid.x.nodes();
+        let distrusted = |window: &Window| window.trust.iter().flatten().any(|trust| *trust < 1.0);
+        let around = self.shading.grid.y.windows_around(&rows);
+        if !around
+            .flat_map(|row| row * columns..(row + 1) * columns)
+            .any(|node| distrusted(&self.shading.windows[node]))
+        {
+            return;
+        }
+        let width = size[0];
+        let relief = relief(0..width);
+        let mut features = FeatureRow::new(width);
+        let mut lines = [0, 1, 2].map(|_| vec![0.0f32; width]);
+        let linear = |x: usize, y: usize| {
+            let log = self.logs.data[y * width + x];
+            (!log.is_nan()).then(|| exp(log))
+        };
+        let flat = residual_interpolation(size, self.cfa, &linear, &(0..width), &rows);
+        for (k, y) in rows.clone().enumerate() {
+            features.fill(&relief, k);
+            for (c, line) in lines.iter_mut().enumerate() {
+                self.shading.channel_row(y, &features, c, line);
+            }
+            let ([top, bottom], v) = self.shading.grid.y.between(y);
+            for x in 0..width {
+                let at = k * width + x;
+                let log = self.logs.data[y * width + x];
+                if log.is_nan() {
+                    continue;
+                }
+                let from = self.cfa.channel(x, y) as usize;
+                let ([left, right], u) = self.shading.grid.x.between(x);
+                let blend = |of: &dyn Fn(&Window) -> f32| {
+                    let value = |row: usize, column: usize| {
+                        of(&self.shading.windows[row * columns + column])
+                    };
+                    let upper = value(top, left) * (1.0 - u) + value(top, right) * u;
+                    let lower = value(bottom, left) * (1.0 - u) + value(bottom, right) * u;
+                    upper * (1.0 - v) + lower * v
+                };
+                for to in (0..3).filter(|to| *to != from) {
+                    let trust = blend(&|window| window.trust[from][to]);
+                    if trust < 1.0 {
+                        let share = blend(&|window| window.by_relief[to]);
+                        let told = lines[to][x] + 0.5 * (log - lines[from][x]);
+                        let interpolated = ln(flat[at][to].max(DARKEST));
+                        let other = share * told + (1.0 - share) * interpolated;
+                        out[at][to] = trust * out[at][to] + (1.0 - trust) * other;
+                    }
+                }
             }
         }
     }

@@ -6,6 +6,7 @@ use super::gram::{Coefficients, Gram, Samples, TERMS};
 use super::grid::Grid;
 use super::numeric::{ln, quantile, smoothstep};
 use super::relief::Relief;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use weavelight_calibration::description::{Cfa, Image};
 
@@ -40,12 +41,14 @@ pub(super) struct Window {
     pub(super) rough: f32,
     /// Of each channel.
     pub(super) channels: [Coefficients; 3],
-    /// Correlation between what relief says of two channels.
-    pub(super) correlation: [[f64; 3]; 3],
+    /// What is to be added to these.
+    pub(super) constants: [f64; 3],
+    /// How far the curve serves from one channel to another: not where a third dye or none of its order leads it.
+    pub(super) trust: [[f32; 3]; 3],
+    /// Where it does not: share of what relief says, beside interpolation.
+    pub(super) by_relief: [f32; 3],
     /// -1: the channel runs against the one that varies most.
     pub(super) signs: [f32; 3],
-    /// Residual of each channel, a share of its spread.
-    pub(super) unexplained: [f32; 3],
     /// How far the crowns stand out of the rest, in logs.
     pub(super) contrast: f32,
     /// What of the crowns' place is not known.
@@ -62,6 +65,7 @@ pub(super) struct Shading {
 struct Cell {
     channels: [Samples; 3],
     rough: Vec<f32>,
+    neighbours: [Neighbours; 3],
     /// Standard deviation of the residuals.
     residual: [f32; 3],
 }
@@ -125,10 +129,17 @@ impl Shading {
         self.windows.iter().all(|window| !window.known)
     }
 
-    /// One value a window, blended to a place.
-    pub(super) fn several_at(&self, place: [usize; 2]) -> f32 {
-        let values: Vec<f32> = self.windows.iter().map(|window| window.several).collect();
-        self.grid.blend(&values, place)
+    /// Share of the windows with several dyes.
+    pub(super) fn several_share(&self) -> f64 {
+        let sum = self.windows.iter().map(|window| f64::from(window.several)).sum::<f64>();
+        sum / self.windows.len() as f64
+    }
+
+    /// How much too low the level may be, relative; the median over the windows.
+    pub(super) fn reads_low(&self) -> f64 {
+        let known = self.windows.iter().filter(|window| window.known);
+        let mut all: Vec<f32> = known.map(Window::reads_low).collect();
+        quantile(&mut all, 0.5).map_or(0.0, f64::from)
     }
 
     /// The window nearest to a place.
@@ -139,30 +150,72 @@ impl Shading {
 
     /// The log of the shade in row `y` into `out`.
     pub(super) fn row(&self, y: usize, features: &FeatureRow, out: &mut [f32]) {
+        self.blend_row(y, features, &Window::line, out);
+        for (out, rough) in out.iter_mut().zip(&features.rough) {
+            *out = bounded(*out, *rough);
+        }
+    }
+
+    /// The log of a channel in row `y`, as relief alone tells it, into `out`.
+    pub(super) fn channel_row(
+        &self,
+        y: usize,
+        features: &FeatureRow,
+        channel: usize,
+        out: &mut [f32],
+    ) {
+        let line = |window: &Window| {
+            let (terms, constant) = (&window.channels[channel], window.constants[channel]);
+            std::array::from_fn(|k| if k < TERMS { terms[k] } else { constant })
+        };
+        self.blend_row(y, features, &line, out);
+    }
+
+    /// Blends what the windows' lines say of a row.
+    fn blend_row(
+        &self,
+        y: usize,
+        features: &FeatureRow,
+        line: &dyn Fn(&Window) -> [f64; TERMS + 1],
+        out: &mut [f32],
+    ) {
         let ([top, bottom], v) = self.grid.y.between(y);
         let columns = self.grid.x.nodes();
-        let between = |column: usize| {
-            let a = self.windows[top * columns + column].line();
-            let b = self.windows[bottom * columns + column].line();
+        let between = |column: usize| -> Line {
+            let a = line(&self.windows[top * columns + column]);
+            let b = line(&self.windows[bottom * columns + column]);
             std::array::from_fn(|k| (a[k] + (b[k] - a[k]) * f64::from(v)) as f32)
         };
         for span in self.grid.x.spans(usize::MAX / 2) {
-            let first: Line = between(span.nodes[0]);
-            let second: Line = between(span.nodes[1]);
+            let first = between(span.nodes[0]);
+            let second = between(span.nodes[1]);
             let change: Line = std::array::from_fn(|k| second[k] - first[k]);
-            let start = span.places.start;
-            for (k, out) in out[span.places.clone()].iter_mut().enumerate() {
-                let x = start + k;
-                let share = span.first + span.step * k as f32;
-                let (mut a, mut b) = (first[TERMS], change[TERMS]);
-                for (f, values) in features.values.iter().enumerate() {
-                    let value = values[x];
-                    a += value * (first[f] + value * first[FEATURES + f]);
-                    b += value * (change[f] + value * change[FEATURES + f]);
-                }
-                *out = bounded(a + share * b, features.rough[x]);
-            }
+            let places = span.places.clone();
+            let values = features.values.each_ref().map(|values| &values[places.clone()]);
+            add_lines(&first, &change, [span.first, span.step], values, &mut out[places]);
         }
+    }
+}
+
+/// Puts what a line says, as it changes along the row, into `out`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn add_lines(
+    first: &Line,
+    change: &Line,
+    [start, step]: [f32; 2],
+    values: [&[f32]; FEATURES],
+    out: &mut [f32],
+) {
+    let length = out.len();
+    let values = values.map(|values| &values[..length]);
+    for (k, out) in out.iter_mut().enumerate() {
+        let (mut a, mut b) = (first[TERMS], change[TERMS]);
+        for f in 0..FEATURES {
+            let value = values[f][k];
+            a += value * (first[f] + value * first[FEATURES + f]);
+            b += value * (change[f] + value * change[FEATURES + f]);
+        }
+        *out = a + (start + step * k as f32) * b;
     }
 }
 
@@ -180,6 +233,20 @@ impl Window {
         std::array::from_fn(|k| if k < TERMS { self.shade[k] } else { -crowns })
     }
 
+    /// Where yarns are resolved, normals spread more than light does: the middle lies about 0.6 times the roughness below
+    /// the crowns. On simulated linen and knit of 1 to 5 photosites a yarn the level falls by the share below for what is
+    /// beyond that.
+    fn reads_low(&self) -> f32 {
+        const RESOLVED: f32 = 0.6;
+        const PER_RATIO: f32 = 0.22;
+        const MOST: f32 = 0.3;
+        const SEVERAL: f32 = 0.15;
+        let ratio = self.contrast / self.rough.max(1e-4);
+        let unresolved = (PER_RATIO * (ratio - RESOLVED)).clamp(0.0, MOST);
+        let structured = smoothstep(self.rough, 0.004, 0.008);
+        structured * (unresolved + (SEVERAL - unresolved) * self.several)
+    }
+
     fn unknown(rough: f32) -> Self {
         Self {
             shade: Coefficients::zeros(),
@@ -187,9 +254,10 @@ impl Window {
             several: 0.0,
             rough,
             channels: [Coefficients::zeros(); 3],
-            correlation: [[1.0; 3]; 3],
+            constants: [0.0; 3],
+            trust: [[1.0; 3]; 3],
+            by_relief: [0.0; 3],
             signs: [1.0; 3],
-            unexplained: [1.0; 3],
             contrast: 0.0,
             known: false,
         }
@@ -225,14 +293,10 @@ impl Window {
         let apart = (apart.sum::<f64>() / 3.0).sqrt() as f32;
         let noise = (0..3).map(|c| residual[c].powi(2) * TERMS as f32 / count[c] as f32);
         let noise = (noise.sum::<f32>() / 3.0).sqrt();
-        // A smaller window tells less.
         let area = grid.x.window(column).len() * grid.y.window(row).len();
-        let smaller = (2.0 * CELL as f32 / (area as f32).sqrt()).clamp(1.0, 4.0);
-        let least = DYES[0] * smaller.powf(1.32);
-        let most = DYES[1] * smaller.powf(1.86);
-        let several = smoothstep(apart, least.max(3.0 * noise), most.max(6.0 * noise));
+        let several = several_dyes(apart, noise, area);
         let spread = channels.map(|c| product(&c, &c).max(0.0).sqrt());
-        let correlation = std::array::from_fn(|i| {
+        let correlation: [[f64; 3]; 3] = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 product(&channels[i], &channels[j]) / (spread[i] * spread[j] + 1e-12)
             })
@@ -243,28 +307,93 @@ impl Window {
             let against = several > 0.5 && flat > 0.5 && correlation[widest][c] < AGAINST;
             if against { -1.0 } else { 1.0 }
         });
-        let mut predicted: Vec<f32> = Vec::new();
-        let mut line = Vec::new();
-        for samples in inside.iter().flat_map(|cell| &cell.channels) {
-            samples.predict(&mean, &mut line);
-            predicted.extend(&line);
-        }
-        let crowns = quantile(&mut predicted, CROWNS).unwrap_or(0.0);
-        let middle = quantile(&mut predicted, 0.5).unwrap_or(0.0);
+        let [crowns, middle] = crowns_and_middle(&inside, &mean);
         let share = f64::from((1.0 - several) * flat);
-        let total = |c: usize| (residual[c].powi(2) + spread[c].powi(2) as f32).sqrt();
+        let deviation = [0, 1, 2].map(|c| equal[c].deviation() as f32);
+        let trust = match several > 0.5 && flat > 0.5 {
+            true => trust(&correlation, &deviation),
+            false => [[1.0; 3]; 3],
+        };
         Self {
             shade: mean * share,
             crowns: f64::from(crowns) * share,
             several: several * flat,
             rough,
             channels,
-            correlation,
+            constants: [0, 1, 2].map(|c| equal[c].constant(&channels[c])),
+            trust,
+            by_relief: by_relief(&inside, &residual, &deviation),
             signs,
-            unexplained: [0, 1, 2].map(|c| residual[c] / total(c).max(1e-6)),
             contrast: crowns - middle,
             known: true,
         }
+    }
+}
+
+/// Whether relief says different things of the channels, from their distance and its noise; a smaller window tells less.
+fn several_dyes(apart: f32, noise: f32, area: usize) -> f32 {
+    let smaller = (2.0 * CELL as f32 / (area as f32).sqrt()).clamp(1.0, 4.0);
+    let least = DYES[0] * smaller.powf(1.32);
+    let most = DYES[1] * smaller.powf(1.86);
+    smoothstep(apart, least.max(3.0 * noise), most.max(6.0 * noise))
+}
+
+/// What the terms say at the crowns of the yarns, and at the median.
+fn crowns_and_middle(inside: &[&Cell], coefficients: &Coefficients) -> [f32; 2] {
+    let mut predicted: Vec<f32> = Vec::new();
+    let mut line = Vec::new();
+    for samples in inside.iter().flat_map(|cell| &cell.channels) {
+        samples.predict(coefficients, &mut line);
+        predicted.extend(&line);
+    }
+    [CROWNS, 0.5].map(|share| quantile(&mut predicted, share).unwrap_or(0.0))
+}
+
+/// Share of relief beside interpolation, by what either leaves over of a channel's spread (fourth powers).
+fn by_relief(inside: &[&Cell], residual: &[f32; 3], deviation: &[f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|c| {
+        let pairs = inside.iter().map(|cell| &cell.neighbours[c]);
+        let apart = (1.0 - Neighbours::correlation(pairs).powi(2)).max(1e-3);
+        let unexplained = (residual[c] / deviation[c].max(1e-6)).powi(4);
+        (apart * apart) as f32 / ((apart * apart) as f32 + unexplained)
+    })
+}
+
+/// How far a curve leads from each channel to each other: they must rise or fall together, and the second must not vary so
+/// much more that it makes noise of what the first does not see.
+fn trust(correlation: &[[f64; 3]; 3], deviation: &[f32; 3]) -> [[f32; 3]; 3] {
+    std::array::from_fn(|from| {
+        std::array::from_fn(|to| {
+            let together = correlation[from][to] as f32;
+            let alike = match together > 0.0 {
+                true => smoothstep(together, 0.85, 0.95),
+                false => smoothstep(-together, 0.5, 0.7),
+            };
+            let steeper = deviation[to] / deviation[from].max(1e-6);
+            if from == to { 1.0 } else { alike * (1.0 - smoothstep(steeper, 2.6, 3.6)) }
+        })
+    })
+}
+
+/// Sums over photosites and the mean of their four neighbours of the same channel.
+#[derive(Clone, Copy, Default)]
+struct Neighbours {
+    sums: [f64; 6],
+}
+
+impl Neighbours {
+    fn add(&mut self, own: f32, around: f32) {
+        let (a, b) = (f64::from(own), f64::from(around));
+        let terms = [1.0, a, b, a * a, b * b, a * b];
+        self.sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    }
+
+    fn correlation<'a>(all: impl Iterator<Item = &'a Self>) -> f64 {
+        let mut total = [0.0; 6];
+        all.for_each(|one| total.iter_mut().zip(one.sums).for_each(|(sum, part)| *sum += part));
+        let [count, a, b, aa, bb, ab] = total.map(|sum| sum / total[0].max(1.0));
+        let (va, vb) = ((aa - a * a).max(0.0), (bb - b * b).max(0.0));
+        if count > 0.0 { (ab - a * b) / (va * vb).sqrt().max(1e-12) } else { 0.0 }
     }
 }
 
@@ -340,6 +469,7 @@ fn sample(
     let mut cell = Cell {
         channels: std::array::from_fn(|_| Samples::default()),
         rough: Vec::new(),
+        neighbours: [Neighbours::default(); 3],
         residual: [0.0; 3],
     };
     let (across, along) = (grid.x.cell(column), grid.y.cell(row));
@@ -366,7 +496,11 @@ fn sample(
                 if value <= 0.0 || !whole(x, y) {
                     continue;
                 }
-                let samples = &mut cell.channels[cfa.channel(x, y) as usize];
+                let channel = cfa.channel(x, y) as usize;
+                if let Some(around) = mean_around_site(guarded, [x, y]) {
+                    cell.neighbours[channel].add(ln(value), around);
+                }
+                let samples = &mut cell.channels[channel];
                 for (all, values) in samples.features.iter_mut().zip(&features.values) {
                     all.push(values[k]);
                 }
@@ -377,4 +511,16 @@ fn sample(
         }
     }
     cell
+}
+
+/// Mean log of the four photosites at a distance of two; `None` where one has no value.
+fn mean_around_site(guarded: &Image<f32>, [x, y]: [usize; 2]) -> Option<f32> {
+    let inside = x >= 2 && y >= 2 && x + 2 < guarded.width && y + 2 < guarded.height;
+    if !inside {
+        return None;
+    }
+    let at = y * guarded.width + x;
+    let all = [at - 2, at + 2, at - 2 * guarded.width, at + 2 * guarded.width];
+    let values = all.map(|at| guarded.data[at]);
+    values.iter().all(|value| *value > 0.0).then(|| values.map(ln).iter().sum::<f32>() / 4.0)
 }

@@ -126,6 +126,19 @@ fn two_dyes_stay_two() {
     }
 }
 
+/// In one channel the dyes are equal: only relief tells there.
+#[test]
+fn dyes_that_are_equal_in_green_are_no_worse_than_interpolated() {
+    for pitch in [2.6, 4.1] {
+        let tan_and_blue = [[0.45, 0.3, 0.15], [0.12, 0.3, 0.45]];
+        let cloth = Cloth::woven([400, 400], pitch, tan_and_blue, Cfa::RGGB);
+        let [_, hue] = cloth.errors(&cloth.found());
+        let [_, before] = cloth.errors(&cloth.interpolated());
+        println!("{pitch} px: {hue}, interpolated {before}");
+        assert!(hue < before, "{pitch} px: {hue}, interpolated {before}");
+    }
+}
+
 #[test]
 fn the_place_of_the_pattern_does_not_matter() {
     let all = ["RGGB", "GRBG", "GBRG", "BGGR"].map(|name| {

@@ -75,10 +75,13 @@ fn normal_text(figures: &NormalFigures) -> String {
 }
 
 fn color_text(figures: &ColorFigures) -> String {
-    let ColorFigures { mean_de2000, rms, psnr_db, pixels } = figures;
+    let ColorFigures { mean_de2000, p95_de2000, false_color, rms, psnr_db, pixels, .. } = figures;
+    let blocks =
+        figures.mean_de2000_4x4.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.4}"));
     let psnr =
         psnr_db.map_or_else(|| "infinite (equal)".to_owned(), |psnr| format!("{psnr:.2} dB"));
     format!(
-        "colours: mean CIEDE2000 {mean_de2000:.4}, rms {rms:.6} (linear), PSNR {psnr}\n{pixels} pixels compared"
+        "colours, CIEDE2000: mean {mean_de2000:.4}, 95 % below {p95_de2000:.4}, 4 x 4 means {blocks}; \
+         false colour {false_color:.4} (a*, b*), rms {rms:.6} (linear), PSNR {psnr}\n{pixels} pixels compared"
     )
 }

@@ -49,13 +49,16 @@ fn text(shots: &[Shot]) -> String {
         // Writing to a String does not fail.
         let _ = writeln!(
             text,
-            "{:8} normal: median {:.2}, RMS {:.2}, 95 % below {:.2} degrees; albedo: RMS {:.4}, CIEDE2000 {:.2}\n{:8} {}",
+            "{:8} normal: median {:.2}, RMS {:.2}, 95 % below {:.2} degrees; albedo: RMS {:.4}, CIEDE2000 {:.2}, 95 % below {:.2}, 4 x 4 means {:.2}, false colour {:.2}\n{:8} {}",
             shot.fabric,
             normal.median_deg,
             normal.rms_deg,
             normal.p95_deg,
             albedo.rms,
             albedo.mean_de2000,
+            albedo.p95_de2000,
+            albedo.mean_de2000_4x4.unwrap_or(f64::NAN),
+            albedo.false_color,
             "",
             shot.page.display(),
         );

@@ -1,15 +1,23 @@
-use super::Pair;
+use super::{Pair, percentile};
 use palette::color_difference::Ciede2000;
 use palette::white_point::D65;
 use palette::{FromColor, Lab, LinSrgb};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Differences between two colour maps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ColorFigures {
     /// Mean CIEDE2000.
     pub mean_de2000: f64,
+    /// CIEDE2000 below which 95 % of the pixels lie.
+    pub p95_de2000: f64,
+    /// Mean CIEDE2000 between means over 4 x 4 pixels, which is what an eye sees of fine patterns; `None` (null in JSON) where
+    /// no block has a value in at least half of its pixels.
+    pub mean_de2000_4x4: Option<f64>,
+    /// False colour: standard deviation of the error of a* and b* together. An error that is the same everywhere is none.
+    pub false_color: f64,
     /// Root mean square difference of the linear values, over pixels and channels.
     pub rms: f64,
     /// 20 log10(1 / rms); `None` (null in JSON) where the maps are equal.
@@ -22,23 +30,74 @@ pub struct ColorFigures {
 ///
 /// Sharma, Wu, Dalal, "The CIEDE2000 color-difference formula", Color Research & Application 30(1), 2005.
 fn ciede2000(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let lab = |[r, g, b]: [f64; 3]| Lab::<D65, f64>::from_color(LinSrgb::new(r, g, b));
     lab(a).difference(lab(b))
 }
 
+fn lab([r, g, b]: [f64; 3]) -> Lab<D65, f64> {
+    Lab::from_color(LinSrgb::new(r, g, b))
+}
+
+/// Pixels that have a colour in both maps, and where they are.
+#[derive(Clone, Debug, Default)]
+pub struct ColorPairs {
+    /// Pixels in a row of the maps.
+    pub width: usize,
+    /// Place of each, row-major, ascending.
+    pub places: Vec<usize>,
+    /// Their colours.
+    pub pairs: Vec<Pair>,
+}
+
+/// Side of the blocks whose means are compared.
+const BLOCK: usize = 4;
+
+/// Mean difference between the blocks' mean colours.
+fn mean_of_blocks(pixels: &ColorPairs) -> Option<f64> {
+    let columns = pixels.width.div_ceil(BLOCK).max(1);
+    let mut blocks: BTreeMap<usize, ([f64; 6], f64)> = BTreeMap::new();
+    for (place, (a, b)) in pixels.places.iter().zip(&pixels.pairs) {
+        let (x, y) = (place % pixels.width.max(1), place / pixels.width.max(1));
+        let (sum, count) = blocks.entry(y / BLOCK * columns + x / BLOCK).or_default();
+        sum.iter_mut().zip(a.iter().chain(b)).for_each(|(sum, value)| *sum += value);
+        *count += 1.0;
+    }
+    let half = (BLOCK * BLOCK / 2) as f64;
+    let of_block = |([r, g, b, s, t, u], count): &([f64; 6], f64)| {
+        ciede2000([r / count, g / count, b / count], [s / count, t / count, u / count])
+    };
+    let found: Vec<f64> =
+        blocks.values().filter(|(_, count)| *count >= half).map(of_block).collect();
+    (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
+}
+
 /// Figures over pixels that have a colour in both maps; `None` of nothing.
-pub fn compare_colors(pairs: &[Pair]) -> Option<ColorFigures> {
+pub fn compare_colors(pixels: &ColorPairs) -> Option<ColorFigures> {
+    let pairs = &pixels.pairs;
     if pairs.is_empty() {
         return None;
     }
-    let differences: Vec<(f64, f64)> = pairs
+    let differences: Vec<[f64; 4]> = pairs
         .par_iter()
-        .map(|(a, b)| (ciede2000(*a, *b), (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>()))
+        .map(|(a, b)| {
+            let square = (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
+            let (lab_a, lab_b) = (lab(*a), lab(*b));
+            [lab_a.difference(lab_b), square, lab_a.a - lab_b.a, lab_a.b - lab_b.b]
+        })
         .collect();
     let count = differences.len() as f64;
-    let rms = (differences.iter().map(|(_, square)| square).sum::<f64>() / (3.0 * count)).sqrt();
+    let mean = |k: usize| differences.iter().map(|d| d[k]).sum::<f64>() / count;
+    let rms = (mean(1) / 3.0).sqrt();
+    let variance = |k: usize| {
+        let middle = mean(k);
+        differences.iter().map(|d| (d[k] - middle).powi(2)).sum::<f64>() / count
+    };
+    let mut sorted: Vec<f64> = differences.iter().map(|d| d[0]).collect();
+    sorted.par_sort_unstable_by(f64::total_cmp);
     Some(ColorFigures {
-        mean_de2000: differences.iter().map(|(difference, _)| difference).sum::<f64>() / count,
+        mean_de2000: mean(0),
+        p95_de2000: percentile(&sorted, 0.95)?,
+        mean_de2000_4x4: mean_of_blocks(pixels),
+        false_color: (variance(2) + variance(3)).sqrt(),
         rms,
         psnr_db: (rms > 0.0).then(|| -20.0 * rms.log10()),
         pixels: pairs.len() as u64,
@@ -114,18 +173,43 @@ mod tests {
     #[test]
     fn figures_of_a_known_set() {
         let pairs = [([0.5; 3], [0.6; 3]), ([0.2; 3], [0.2; 3])];
-        let found = compare_colors(&pairs).unwrap();
+        let of = |pairs: &[Pair]| {
+            let places = (0..pairs.len()).collect();
+            compare_colors(&ColorPairs { width: 8, places, pairs: pairs.to_vec() })
+        };
+        let found = of(&pairs).unwrap();
         assert!((found.rms - 0.1 / 2f64.sqrt()).abs() < 1e-15, "{found:?}");
         assert!((found.psnr_db.unwrap() - 23.010_299_956).abs() < 1e-6, "{found:?}");
         assert!(found.mean_de2000 > 1.0 && found.mean_de2000 < 4.0, "{found:?}");
-        let equal = compare_colors(&pairs[1..]).unwrap();
+        let equal = of(&pairs[1..]).unwrap();
         assert_eq!((equal.mean_de2000, equal.rms, equal.psnr_db), (0.0, 0.0, None));
         // Albedo may exceed 1 and noise may go below 0.
-        assert!(
-            compare_colors(&[([1.2, -0.01, 0.5], [1.1, 0.0, 0.5])])
-                .unwrap()
-                .mean_de2000
-                .is_finite()
+        assert!(of(&[([1.2, -0.01, 0.5], [1.1, 0.0, 0.5])]).unwrap().mean_de2000.is_finite());
+    }
+
+    #[test]
+    fn patterns_finer_than_a_block_and_false_colours_have_figures_of_their_own() {
+        let grey = [0.4; 3];
+        let chequered = |k: usize| (k % 16 + k / 16).is_multiple_of(2);
+        let check = |colour: &dyn Fn(usize) -> [f64; 3]| {
+            let pairs = (0..256).map(|k| (colour(k), grey)).collect();
+            let pixels = ColorPairs { width: 16, places: (0..256).collect(), pairs };
+            compare_colors(&pixels).unwrap()
+        };
+        let light = check(&|k| if chequered(k) { [0.5; 3] } else { [0.3; 3] });
+        assert!(light.mean_de2000 > 5.0 && light.mean_de2000_4x4.unwrap() < 1e-9, "{light:?}");
+        assert!(light.false_color < 1e-2, "{light:?}");
+        let tinted = check(&|k| if chequered(k) { [0.45, 0.4, 0.4] } else { [0.35, 0.4, 0.4] });
+        assert!((3.0..4.5).contains(&tinted.false_color), "{tinted:?}");
+        let even = check(&|_| [0.45, 0.4, 0.4]);
+        assert!(even.false_color < 1e-9 && even.mean_de2000 > 3.0, "{even:?}");
+        assert_eq!(
+            even.mean_de2000_4x4.map(|d| (d * 1e9).round()),
+            Some((even.mean_de2000 * 1e9).round())
         );
+        assert!((even.p95_de2000 - even.mean_de2000).abs() < 1e-9);
+        // A block of which less than half counts is left out.
+        let few = ColorPairs { width: 16, places: vec![0, 1], pairs: vec![(grey, grey); 2] };
+        assert_eq!(compare_colors(&few).unwrap().mean_de2000_4x4, None);
     }
 }

@@ -7,7 +7,7 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 
-pub use color::{ColorFigures, compare_colors};
+pub use color::{ColorFigures, ColorPairs, compare_colors};
 pub use normal::{NormalFigures, angle_deg, compare_normals};
 pub use statistics::percentile;
 
@@ -98,11 +98,15 @@ pub fn run(options: &Options) -> Result<Comparison, CompareError> {
     }
     let kind = options.kind.unwrap_or_else(|| guess_kind(&a, &b));
     let (a, b) = (a.map(kind)?, b.map(kind)?);
-    let (pairs, left_out) =
-        counted_pairs(&a.data, &b.data, mask.as_ref().map(|mask| &mask.data[..]));
+    let mask = mask.as_ref().map(|mask| &mask.data[..]);
+    let (places, pairs) = counted_pairs(&a.data, &b.data, mask);
+    let inside = mask.map_or(a.data.len(), |mask| mask.iter().filter(|inside| **inside).count());
+    let left_out = (inside - pairs.len()) as u64;
     let figures = match kind {
         Kind::Normal => compare_normals(&pairs).map(Figures::Normal),
-        Kind::Color => compare_colors(&pairs).map(Figures::Color),
+        Kind::Color => {
+            compare_colors(&ColorPairs { width: a.width, places, pairs }).map(Figures::Color)
+        }
     };
     let nothing = || CompareError::Nothing { a: options.a.clone(), b: options.b.clone() };
     Ok(Comparison { figures: figures.ok_or_else(nothing)?, left_out })
@@ -139,19 +143,13 @@ fn is_unit(pixel: &[f32; 3]) -> bool {
     (pixel.iter().map(|value| value * value).sum::<f32>() - 1.0).abs() < 0.01
 }
 
-/// The pixels inside the mask with a value in both maps, and how many inside lack one.
-fn counted_pairs(a: &[[f32; 3]], b: &[[f32; 3]], mask: Option<&[bool]>) -> (Vec<Pair>, u64) {
+/// The pixels inside the mask with a value in both maps: their places and values.
+fn counted_pairs(a: &[[f32; 3]], b: &[[f32; 3]], mask: Option<&[bool]>) -> (Vec<usize>, Vec<Pair>) {
     let inside = |k: usize| mask.is_none_or(|mask| mask[k]);
-    let mut left_out = 0;
-    let mut pairs = Vec::new();
-    for (_, (a, b)) in a.iter().zip(b).enumerate().filter(|(k, _)| inside(*k)) {
-        if has_value(a) && has_value(b) {
-            pairs.push((a.map(f64::from), b.map(f64::from)));
-        } else {
-            left_out += 1;
-        }
-    }
-    (pairs, left_out)
+    let all = a.iter().zip(b).enumerate().filter(|(k, _)| inside(*k));
+    all.filter(|(_, (a, b))| has_value(a) && has_value(b))
+        .map(|(k, (a, b))| (k, (a.map(f64::from), b.map(f64::from))))
+        .unzip()
 }
 
 fn check_size(

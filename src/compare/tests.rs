@@ -266,8 +266,8 @@ fn only_pixels_with_a_value_in_both_count() {
         [0.0, f32::INFINITY, 0.0],
         [0.0, 1.0, 0.0],
     ];
-    let (pairs, left_out) = counted_pairs(&a, &b, None);
-    assert_eq!((pairs.len(), left_out), (2, 3));
-    let (pairs, left_out) = counted_pairs(&a, &b, Some(&[false, true, true, false, true]));
-    assert_eq!((pairs.len(), left_out), (1, 2));
+    let (places, pairs) = counted_pairs(&a, &b, None);
+    assert_eq!((pairs.len(), places), (2, vec![0, 4]));
+    let (places, pairs) = counted_pairs(&a, &b, Some(&[false, true, true, false, true]));
+    assert_eq!((pairs.len(), places), (1, vec![4]));
 }

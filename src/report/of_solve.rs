@@ -3,7 +3,7 @@
 use super::distribution::{Distribution, number};
 use super::picture::{self, LONGEST_SIDE, Thumbnail};
 use super::solution::{Figure, SolutionPage, TruthErrors, Verdict};
-use crate::compare::{angle_deg, compare_colors};
+use crate::compare::{ColorPairs, angle_deg, compare_colors};
 use crate::solution::Report;
 use crate::solve::{Shown, Stage};
 use weavelight_calibration::description::Image;
@@ -106,16 +106,24 @@ fn angles(a: &Image<[f32; 3]>, b: &Image<[f32; 3]>) -> Image<[f32; 1]> {
 fn errors(shown: &Shown, truth: Option<&Truth>, angles: &Image<[f32; 1]>) -> TruthErrors {
     let solved =
         |data: &[[f32; 1]]| Distribution::of(strided(data.as_flattened()).filter(|v| *v > 0.0));
-    let pairs = |truth: &Truth| -> Vec<([f64; 3], [f64; 3])> {
-        let both = shown.maps.albedo.data.iter().zip(&truth.albedo.data);
-        both.filter(|(a, b)| **a != [0.0; 3] && **b != [0.0; 3])
-            .map(|(a, b)| (a.map(f64::from), b.map(f64::from)))
-            .collect()
+    let pairs = |truth: &Truth| {
+        let both = shown.maps.albedo.data.iter().zip(&truth.albedo.data).enumerate();
+        let (places, pairs) = both
+            .filter(|(_, (a, b))| **a != [0.0; 3] && **b != [0.0; 3])
+            .map(|(k, (a, b))| (k, (a.map(f64::from), b.map(f64::from))))
+            .unzip();
+        ColorPairs { width: truth.albedo.width, places, pairs }
     };
     let color = truth.and_then(|truth| compare_colors(&pairs(truth)));
     let figures = color.map_or(Vec::new(), |color| {
         vec![
             ("albedo, mean CIEDE2000".to_owned(), format!("{:.2}", color.mean_de2000)),
+            ("albedo, 95 % below, CIEDE2000".to_owned(), format!("{:.2}", color.p95_de2000)),
+            (
+                "albedo, means of 4 x 4 pixels, CIEDE2000".to_owned(),
+                color.mean_de2000_4x4.map_or_else(|| "-".to_owned(), |mean| format!("{mean:.2}")),
+            ),
+            ("albedo, false colour (a*, b*)".to_owned(), format!("{:.2}", color.false_color)),
             ("albedo, RMS of the linear values".to_owned(), format!("{:.4}", color.rms)),
         ]
     });

@@ -110,8 +110,22 @@ fn of_mosaic(
     Coloured { albedo: reflectance, shade, report, said: level_warning(&figures, kind) }
 }
 
-fn level_warning(_figures: &Figures, _kind: AlbedoKind) -> Vec<String> {
-    vec![]
+/// Above this share, that the level reads low is worth a sentence.
+const WORTH_SAYING: f64 = 0.05;
+
+fn level_warning(figures: &Figures, kind: AlbedoKind) -> Vec<String> {
+    if kind == AlbedoKind::Appearance || figures.reads_low < WORTH_SAYING {
+        return vec![];
+    }
+    let why = match figures.several_share > 0.5 {
+        true => "the shade of yarns of several dyes cannot be told from the dyes and stays in it",
+        false => "the sensor does not resolve the yarns",
+    };
+    let percent = 100.0 * figures.reads_low;
+    vec![format!(
+        "The albedo reads up to {percent:.0} % low: {why}. One reading of a spectrophotometer on the same cloth, or the cloth \
+         photographed beside a white card, gives the factor that is missing."
+    )]
 }
 
 /// The albedo with its shading; says why, where reflectance was asked for.

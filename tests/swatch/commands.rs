@@ -63,6 +63,7 @@ fn what_nobody_asks_for_is_not_made_and_the_rest_is_the_same() {
     check("normal", &["normal.exr"]);
     check("normal,png", &["normal.exr", "normal.png"]);
     check("albedo,confidence", &["albedo.exr", "confidence.exr"]);
+    check("shade", &["shade.exr"]);
     check("page", &["report.html"]);
 }
 
@@ -81,6 +82,8 @@ fn what_has_not_changed_is_not_solved_again() {
     assert!(made(&["--force"]), "asked to");
     assert!(made(&["--mask", "auto"]), "another mask");
     assert!(!made(&["--mask", "auto"]), "that mask again");
+    assert!(made(&["--albedo", "appearance"]), "another albedo");
+    assert!(!made(&["--albedo", "appearance"]), "that albedo again");
     assert!(made(&["--preview", "4"]), "a preview");
     assert!(!made(&["--preview", "4"]), "that preview again");
     assert!(made(&["--only", "normal"]), "the whole again");

@@ -1,5 +1,6 @@
 //! The run from folder to folder, over small capture sessions of 16-bit PNG.
 
+use super::super::finish::finish;
 use super::super::*;
 use super::scenes::{Recipe, scene};
 use crate::files::Provenance;
@@ -114,6 +115,7 @@ fn a_run_writes_what_the_kernels_found() {
             "mask.png",
             "normal.exr",
             "normal.png",
+            "shade.exr",
         ];
         assert_eq!(names(&files), expected);
         let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
@@ -126,8 +128,51 @@ fn a_run_writes_what_the_kernels_found() {
         let report = solution::Solution::load(&options.out).unwrap().report;
         assert_eq!(report.lights_used, (0..10).collect::<Vec<_>>());
         assert_eq!((report.pixels, report.solved), (3500, maps.counts.solved() as u64));
-        assert_eq!(report.warnings, Vec::<String>::new());
+        // The picture is smaller than a window of the colours.
+        let [said] = &report.warnings[..] else { panic!("{:?}", report.warnings) };
+        assert!(said.starts_with("The albedo is as it appears"), "{said}");
+        assert_eq!(report.albedo.unwrap().kind, "appearance");
         assert!((report.mm_per_px.unwrap() - 3.0).abs() < 0.2, "{:?}", report.mm_per_px);
+    }
+}
+
+#[test]
+fn albedo_times_shade_is_the_photosites_own_value() {
+    let cfa = weavelight_calibration::description::Cfa::RGGB;
+    let recipe =
+        Recipe { width: 160, height: 150, layout: Layout::Mosaic(cfa), ..Recipe::default() };
+    let scene = scene(recipe);
+    let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
+    let Albedo::Mosaic(own, _) = &maps.albedo else { panic!("a mosaic gives a mosaic") };
+    let own = own.clone();
+    let inverse = scene.color.camera_to_linear_srgb.map(|matrix| matrix.try_inverse().unwrap());
+    let make = |kind| finish(maps.clone(), &scene.color, Outputs::ALL, kind);
+    let (reflectance, appearance) = (make(AlbedoKind::Reflectance), make(AlbedoKind::Appearance));
+    assert_eq!(reflectance.albedo_report.kind, "reflectance");
+    assert_eq!(appearance.albedo_report.kind, "appearance");
+    assert!(appearance.shade.data.iter().all(|shade| [0.0, 1.0].contains(shade)));
+    assert!(reflectance.shade.data.iter().all(|shade| (0.0..=1.0).contains(shade)));
+    let camera = |rgb: [f32; 3]| {
+        let rgb = nalgebra::Vector3::from(rgb).cast::<f64>();
+        inverse.map_or(rgb, |inverse| inverse * rgb)
+    };
+    let mut compared = 0;
+    for (k, value) in own.data.iter().enumerate().filter(|(_, value)| **value > 0.0) {
+        let channel = cfa.channel(k % 160, k / 160) as usize;
+        for maps in [&reflectance, &appearance] {
+            let rgb = maps.albedo.data[k];
+            if rgb.iter().any(|v| [0.0, crate::albedo::BRIGHTEST].contains(v)) {
+                continue;
+            }
+            let back = camera(rgb)[channel] * f64::from(maps.shade.data[k]);
+            let off = (back / f64::from(*value) - 1.0).abs();
+            assert!(off < 1e-5, "{k}: {back} and {value}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 160 * 150, "{compared} photosites are no proof");
+    for rgb in reflectance.albedo.data.iter().chain(&appearance.albedo.data) {
+        assert!(rgb.iter().all(|v| (0.0..=crate::albedo::BRIGHTEST).contains(v)), "{rgb:?}");
     }
 }
 
