@@ -73,7 +73,10 @@ fn scan_again_is_about_the_scan_that_is_shown_and_undone_as_a_whole() {
         window.until_label("Look closer");
         window.until_label("Light 9, taken");
     }
-    assert!(window.harness.state().desk().problems.is_empty());
+    // So small a picture has no reflectance, which its report says.
+    let problems = &window.harness.state().desk().problems;
+    let about = |text: &str| text.contains("The albedo is as it appears");
+    assert!(problems.iter().all(|problem| about(&problem.text)), "{problems:?}");
     empty_the_bin(&window.home());
 }
 

@@ -180,5 +180,5 @@ fn without_a_display_there_is_an_error_with_a_remedy() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.starts_with("error: the window cannot be opened (") && said.lines().count() == 1);
-    assert!(said.contains("weavelight --help"), "{said}");
+    assert!(said.contains("weavelight help"), "{said}");
 }
