@@ -410,6 +410,8 @@ impl eframe::App for App {
         self.put_question(&ctx);
         widgets::show_focus(&ctx);
         self.window.follow(&ctx, &mut self.desk.settings);
+        // There may be no frame after this one for a long time.
+        self.keeper.look_at(&self.desk.settings);
         self.escape_is_taken = self.question.is_some()
             || ctx.dragged_id().is_some()
             || egui::Popup::is_any_open(&ctx)
