@@ -13,7 +13,8 @@ fn main() -> ExitCode {
     match run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", texts::shell::no_window(&error));
+            #[allow(clippy::print_stderr, reason = "there is no window to show it in")]
+            let () = eprintln!("error: {}", texts::shell::no_window(&error));
             ExitCode::FAILURE
         }
     }

@@ -126,11 +126,11 @@ fn fill_row(relief: &Relief, k: usize, out: &mut FeatureRow) {
                 + 3.0 * (s[at - 1] + s[at + 1])
                 + 4.0 * s[at])
     };
-    for x in 0..width {
+    for (x, (spread, rough)) in spread.iter_mut().zip(&mut out.rough).take(width).enumerate() {
         let at = x + REACH;
         let length = |a: f32, b: f32, c: f32| (a * a + b * b + c * c).sqrt();
-        spread[x] = 1.0 - length(tent3(three_u, at), tent3(three_v, at), tent3(three_z, at));
-        out.rough[x] = 1.0 - length(tent7(seven_u, at), tent7(seven_v, at), tent7(seven_z, at));
+        *spread = 1.0 - length(tent3(three_u, at), tent3(three_v, at), tent3(three_z, at));
+        *rough = 1.0 - length(tent7(seven_u, at), tent7(seven_v, at), tent7(seven_z, at));
     }
 }
 

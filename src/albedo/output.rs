@@ -307,6 +307,7 @@ impl<'a> Found<'a> {
                 self.shading.channel_row(y, &features, c, line);
             }
             let ([top, bottom], v) = self.shading.grid.y.between(y);
+            #[allow(clippy::needless_range_loop, reason = "a place in several rows and channels")]
             for x in 0..width {
                 let at = k * width + x;
                 let log = self.logs.data[y * width + x];

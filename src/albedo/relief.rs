@@ -64,8 +64,8 @@ impl Relief {
         let (start, end) = (columns.start.saturating_sub(REACH), (columns.end + REACH).min(width));
         let left = start + REACH - columns.start;
         let solved = &mask.data[y * width..(y + 1) * width];
-        for x in start..end {
-            let n = if solved[x] != 0 { *normal.at(x, y) } else { stand_in(normal, mask, [x, y]) };
+        for (x, solved) in solved.iter().enumerate().take(end).skip(start) {
+            let n = if *solved != 0 { *normal.at(x, y) } else { stand_in(normal, mask, [x, y]) };
             let at = row + left + x - start;
             (self.n_u[at], self.n_v[at], self.n_z[at]) = (n[0], -n[1], n[2]);
         }

@@ -234,7 +234,7 @@ fn bad_input_is_refused_by_name() {
     let cloth = Cloth::woven([200, 200], 5.3, [[0.5; 3]; 2], fuji);
     assert_eq!(refused(&cloth), Some(Refused::NotBayer));
     let mut cloth = Cloth::linen([200, 200]);
-    let red = |k: usize| k % 200 % 2 == 0 && k / 200 % 2 == 0;
+    let red = |k: usize| (k % 200).is_multiple_of(2) && (k / 200).is_multiple_of(2);
     (0..200 * 200).filter(|k| red(*k)).for_each(|k| cloth.mask.data[k] = 0);
     assert_eq!(refused(&cloth), Some(Refused::Missing("red")));
     let mut cloth = Cloth::linen([300, 300]);
