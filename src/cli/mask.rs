@@ -24,7 +24,7 @@ pub(super) struct Args {
     /// Picture to write [default: mask.png in the capture session]
     #[arg(long, value_name = "M.png")]
     out: Option<PathBuf>,
-    /// Replace a picture that differs and may have been edited
+    /// Replace a picture that differs and may have been edited; it is kept beside it as mask-1.png
     #[arg(long)]
     force: bool,
 }

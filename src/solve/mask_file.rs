@@ -4,7 +4,9 @@ use super::load::{load, read_mask};
 use super::options::{MaskChoice, Options, Reuse};
 use super::swatch::{Swatch, find_swatch};
 use super::{Progress, SolveError, leave_out_what_adds_nothing};
-use crate::files::{FileError, Lock, clean_temporary, parent_of, write_atomic};
+use crate::files::{
+    FileError, Lock, clean_temporary, parent_of, sha256_hex, sha256_of_file, write_atomic,
+};
 use crate::instrument::Calibration;
 use crate::raster::encode_png_grey8;
 use crate::session::Session;
@@ -69,7 +71,10 @@ pub fn make_mask(
     let up_to_date = match stands {
         Some(mask) if mask != swatch.mask => return Err(SolveError::EditedMask { path }),
         Some(_) => true,
-        None => write_mask(&path, &swatch.mask).map(|()| false)?,
+        None => {
+            warnings.extend(write_mask(&path, &swatch.mask)?);
+            false
+        }
     };
     let named = name_in_session(&mut session, &path)?;
     Ok(MaskMade { path, swatch, up_to_date, named, warnings })
@@ -90,11 +95,37 @@ fn lock(session: &Path, path: &Path) -> Result<[Option<Lock>; 2], FileError> {
     Ok([whole, alone])
 }
 
-fn write_mask(path: &Path, mask: &Image<bool>) -> Result<(), FileError> {
+/// Writes it; what stood there and differs is kept beside it, which the sentence says.
+fn write_mask(path: &Path, mask: &Image<bool>) -> Result<Option<String>, FileError> {
     let data = mask.data.iter().map(|&inside| if inside { 255 } else { 0 }).collect();
     let picture = Image { width: mask.width, height: mask.height, data };
     let bytes = encode_png_grey8(&picture).map_err(|source| FileError::write(path, source))?;
-    write_atomic(path, &bytes)
+    let kept = keep_aside(path, &bytes)?;
+    write_atomic(path, &bytes)?;
+    let said =
+        |kept: PathBuf| format!("The picture that stood there is kept as {}.", kept.display());
+    Ok(kept.map(said))
+}
+
+/// Gives a file that is about to be replaced by other bytes a second name: `mask-1.png`, or the next that is free.
+fn keep_aside(path: &Path, bytes: &[u8]) -> Result<Option<PathBuf>, FileError> {
+    // Through links, as it is replaced; what is no file is refused by the writing.
+    let Ok(path) = path.canonicalize() else { return Ok(None) };
+    if !path.is_file() || sha256_of_file(&path)? == sha256_hex(bytes) {
+        return Ok(None);
+    }
+    let stem = path.file_stem().unwrap_or_default();
+    for number in 1.. {
+        let mut name = stem.to_owned();
+        name.push(format!("-{number}.png"));
+        let aside = path.with_file_name(name);
+        match std::fs::hard_link(&path, &aside) {
+            Ok(()) => return Ok(Some(aside)),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(FileError::write(&aside, error)),
+        }
+    }
+    Ok(None)
 }
 
 /// Records the mask where it lies in the capture session's folder; true if it does.

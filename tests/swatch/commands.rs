@@ -137,8 +137,14 @@ fn an_edited_mask_is_kept_and_heeded() {
         with_hole["outcomes"]["masked"].as_u64(),
         masked["outcomes"]["masked"].as_u64().map(|n| n + 50)
     );
-    let (status, again, _) = run(&[&fixed[..], &["--force"]].concat());
+    let (status, again, stderr) = run(&[&fixed[..], &["--force"]].concat());
     assert_eq!((status, &again["up_to_date"]), (0, &Value::Bool(false)));
+    assert!(stderr.contains("is kept as") && stderr.contains("mask-1.png"), "{stderr}");
+    let kept = image::open(session.join("mask-1.png")).unwrap().into_luma8();
+    assert_eq!(kept, edited, "the edited one lost nothing");
+    // The same again has nothing to keep.
+    assert_eq!(run(&[&fixed[..], &["--force"]].concat()).0, 0);
+    assert!(!session.join("mask-2.png").exists());
     assert_eq!(image::open(&picture).unwrap().into_luma8().get_pixel(120, 80).0, [255]);
     // Elsewhere it is nobody's mask but one's own.
     let elsewhere = scan.path("elsewhere.png");
