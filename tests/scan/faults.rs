@@ -168,7 +168,7 @@ fn provoke(case: &Case, laboratory: &mut Laboratory) -> Outcome {
         How::DiskFills => on_a_small_disk(
             laboratory,
             "size=40m",
-            "while [ ! -e disk/s/light-02.dng ]; do sleep 0.01; done; head -c 100m /dev/zero > disk/fill",
+            "while [ ! -e disk/s/light-02.dng ]; do sleep 0.01; done; head -c 100m /dev/zero > disk/fill 2> /dev/null",
         ),
         How::Occupied => {
             in_memory(laboratory, none(), Begin::Anew, SETTINGS.iso).unwrap();
