@@ -61,7 +61,7 @@ pub struct Comparison {
 pub enum CompareError {
     /// A map cannot be read.
     #[error(transparent)]
-    Picture(#[from] crate::raster::FileError),
+    File(#[from] crate::files::FileError),
     /// Maps or mask of different size.
     #[error("{}: is {} x {}, but {} is {} x {}; give pictures of one size", .b.display(), .b_size[0], .b_size[1], .a.display(), .a_size[0], .a_size[1])]
     Size {

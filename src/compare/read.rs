@@ -1,9 +1,10 @@
 //! Maps from files of any kind: OpenEXR as it is, integers decoded by what the map holds.
 
 use super::{CompareError, Kind, has_value, is_unit};
+use crate::files::FileError;
 use crate::raster::{
-    Choice, Curve, Exr, FileError, Format, Picture, PictureError, Role, SaidCurve, Values,
-    decode_exr, decode_picture,
+    Choice, Curve, Exr, Format, Picture, PictureError, Role, SaidCurve, Values, decode_exr,
+    decode_picture,
 };
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::Image;
@@ -30,13 +31,13 @@ impl Source {
     /// Where it cannot be read.
     pub(super) fn open(path: &Path) -> Result<Self, CompareError> {
         let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
-            .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+            .map_err(|source| FileError::read(path, source))?;
         let content = match Format::sniff(&bytes) {
             Some(Format::Exr) => decode_exr(&bytes).map(Content::Exr),
             format => decode_picture(&bytes)
                 .map(|picture| Content::Picture(picture, format.unwrap_or(Format::Tiff))),
         };
-        let content = content.map_err(|source| failed(path, source))?;
+        let content = content.map_err(|source| failed(path, &source))?;
         Ok(Self { path: path.to_owned(), content })
     }
 
@@ -92,7 +93,7 @@ impl Source {
             (Content::Picture(picture, _), Kind::Normal) => Ok(triples(&picture).collect()),
             (Content::Picture(picture, format), Kind::Color) => colors(&picture, format),
         };
-        let data = data.map_err(|source| failed(&self.path, source))?;
+        let data = data.map_err(|source| failed(&self.path, &source))?;
         Ok(Image { width, height, data })
     }
 }
@@ -104,8 +105,8 @@ pub(super) enum Suggestion {
     Likely(Kind),
 }
 
-fn failed(path: &Path, source: PictureError) -> CompareError {
-    FileError::Content { path: path.to_owned(), source }.into()
+fn failed(path: &Path, source: &PictureError) -> CompareError {
+    FileError::Content { path: path.to_owned(), what: source.to_string() }.into()
 }
 
 fn of_floats(pixels: impl Iterator<Item = [f32; 3]>) -> Suggestion {

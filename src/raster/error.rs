@@ -1,9 +1,10 @@
-use std::path::PathBuf;
+use crate::files::FileError;
+use std::path::Path;
 
 /// Characters of a library's message that an error repeats.
 const LONGEST_REASON: usize = 160;
 
-/// Why bytes are no usable picture. The message says what is wrong and what to do; whoever knows the path adds it.
+/// Why bytes are no usable picture. The message says what is wrong and what to do; the caller that knows the path adds it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureError {
     /// No bytes at all.
@@ -85,23 +86,7 @@ impl PictureError {
     }
 }
 
-/// A picture file that could not be read.
-#[derive(Debug, thiserror::Error)]
-pub enum FileError {
-    /// Missing, or not readable.
-    #[error("{}: {}", path.display(), crate::files::read_advice(source))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The content is no usable picture.
-    #[error("{}: {source}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: PictureError,
-    },
+/// Of a picture file that holds no usable picture.
+pub(crate) fn content_error(path: &Path, source: &PictureError) -> FileError {
+    FileError::Content { path: path.to_owned(), what: source.to_string() }
 }

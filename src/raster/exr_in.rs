@@ -4,11 +4,13 @@
 //! the data window says where in it (or beyond it) there are values.
 
 use super::encoding::Said;
+use super::error::content_error;
 use super::exr_layers::{Choice, choose};
 use super::guard::guarded;
 use super::picture::{Alpha, Format, Picture, Values, not_a_picture};
 use super::primaries::linear_srgb_from;
-use super::{FileError, Group, PictureError, limits};
+use super::{Group, PictureError, limits};
+use crate::files::FileError;
 use exr::meta::header::Header;
 use exr::prelude::{AnyChannel, FlatSamples, MetaData, ReadChannels, ReadLayers, read};
 use std::io::Cursor;
@@ -103,8 +105,8 @@ impl Exr {
 /// [`FileError`] with the path.
 pub fn read_exr(path: &Path) -> Result<Exr, FileError> {
     let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
-        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-    decode_exr(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
+        .map_err(|source| FileError::read(path, source))?;
+    decode_exr(&bytes).map_err(|source| content_error(path, &source))
 }
 
 /// Decodes the flat layers of an EXR file: half, float and unsigned channels, scan lines or tiles (the largest level), any

@@ -1,7 +1,9 @@
 //! Masks: one meaning, wherever a picture says what is inside.
 
+use super::PictureError;
+use super::error::content_error;
 use super::picture::{Format, Picture, Values, decode_picture};
-use super::{FileError, PictureError};
+use crate::files::FileError;
 use std::path::Path;
 use weavelight_calibration::description::Image;
 
@@ -14,8 +16,8 @@ const JPEG_INSIDE: u8 = 128;
 /// [`FileError`] with the path. Whether the size fits is the caller's to judge.
 pub fn read_mask(path: &Path) -> Result<Image<bool>, FileError> {
     let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
-        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-    decode_mask(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
+        .map_err(|source| FileError::read(path, source))?;
+    decode_mask(&bytes).map_err(|source| content_error(path, &source))
 }
 
 /// Decodes a mask: any picture; true is inside.

@@ -22,7 +22,7 @@ mod tests;
 mod tiff_in;
 
 pub use encoding::{Curve, Said, SaidCurve, Tone};
-pub use error::{FileError, PictureError};
+pub use error::PictureError;
 pub use exr_in::{Exr, decode_exr, read_exr};
 pub(crate) use exr_layers::Choice;
 pub use exr_layers::{Group, Role};

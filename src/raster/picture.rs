@@ -1,9 +1,11 @@
 //! Any picture file that other programs write, values as the file has them.
 
 use super::encoding::Said;
+use super::error::content_error;
 use super::foreign::kind_not_read;
 use super::guard::guarded;
-use super::{FileError, PictureError, exr_in, jpeg_in, png_in, tiff_in};
+use super::{PictureError, exr_in, jpeg_in, png_in, tiff_in};
+use crate::files::FileError;
 use std::path::Path;
 
 /// A decoded picture: rows from the top left, channels interleaved.
@@ -154,8 +156,8 @@ pub fn decode_picture(bytes: &[u8]) -> Result<Picture, PictureError> {
 /// [`FileError`] with the path.
 pub fn read_picture(path: &Path) -> Result<Picture, FileError> {
     let bytes = crate::files::read_input(path, crate::files::InputKind::Picture)
-        .map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-    decode_picture(&bytes).map_err(|source| FileError::Content { path: path.to_owned(), source })
+        .map_err(|source| FileError::read(path, source))?;
+    decode_picture(&bytes).map_err(|source| content_error(path, &source))
 }
 
 /// The error for bytes of no picture format that is read.

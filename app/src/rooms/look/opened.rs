@@ -51,9 +51,6 @@ pub(super) enum OpenError {
     /// A file is missing or broken.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A picture is missing or broken.
-    #[error(transparent)]
-    Picture(#[from] weavelight::raster::FileError),
     /// A map is not there.
     #[error("{path} is missing, so that the solution is not whole; solve the scan again")]
     Missing {
