@@ -26,9 +26,12 @@ pub use report::{MethodReport, Report, SetReport, Touch};
 pub use sets::{Fabric, SetFolders};
 pub use table::{curves_text, sets_text};
 
-use crate::files::{OutputKind, PROGRAM, SCHEMA, StagedFolder, write_atomic};
+use crate::files::{OutputKind, PROGRAM, StagedFolder, write_atomic};
 use sets::Set;
 use std::path::PathBuf;
+
+/// The schema of `bench.json` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// The figures, in the output folder.
 pub const BENCH_JSON: &str = "bench.json";

@@ -55,8 +55,5 @@ pub use write_toml::{
     DateTimeError, datetime_from_timestamp, timestamp_from_datetime, toml_bytes, write_toml,
 };
 
-/// The schema number that this version writes and reads, for every format.
-pub const SCHEMA: i64 = 1;
-
 /// What a written file says of the program that wrote it.
 pub const PROGRAM: &str = concat!("weavelight ", env!("CARGO_PKG_VERSION"));

@@ -1,7 +1,7 @@
 //! `camera.toml`: the keys of the format, to and from [`Camera`].
 
 use super::Optics;
-use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_owned_toml};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, write_owned_toml};
 use crate::quantity::{
     CAMERA_HEIGHT_MM, DISTORTION, FOCAL_LENGTH_MM, FOCAL_LENGTH_PX, PLACE_MM, PRINCIPAL_POINT_PX,
     Problem, REPROJECTION_PX, check_side,
@@ -10,6 +10,9 @@ use nalgebra::{IsometryMatrix3, Matrix3, Rotation3, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use weavelight_calibration::description::Camera;
+
+/// The schema of `camera.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// The file's name in a calibration folder.
 pub const CAMERA_FILE: &str = "camera.toml";

@@ -2,8 +2,7 @@
 
 use super::{Color, Noise};
 use crate::files::{
-    Document, FileError, Owned, Provenance, ProvenanceTable, SCHEMA, update_owned_toml,
-    write_owned_toml,
+    Document, FileError, Owned, Provenance, ProvenanceTable, update_owned_toml, write_owned_toml,
 };
 use crate::quantity::{
     BLACK_DN, COLOR_MATRIX, ELECTRONS_PER_DN, KAPPA, Problem, READ_NOISE_E, SATURATION_DN,
@@ -12,6 +11,9 @@ use crate::quantity::{
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// The schema of `color.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// The file's name in a calibration folder.
 pub const COLOR_FILE: &str = "color.toml";

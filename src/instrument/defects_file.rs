@@ -1,9 +1,12 @@
 //! `defects.toml`: photosites of the camera that do not measure light.
 
 use super::Defects;
-use crate::files::{Document, FileError, Provenance, ProvenanceTable, SCHEMA, write_owned_toml};
+use crate::files::{Document, FileError, Provenance, ProvenanceTable, write_owned_toml};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// The schema of `defects.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// The file's name in a calibration folder.
 pub const DEFECTS_FILE: &str = "defects.toml";

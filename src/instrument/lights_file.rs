@@ -3,8 +3,8 @@
 use super::gain_map::{encode_gain_map, read_gain_map};
 use super::{CalibratedLight, LIGHT_COUNT};
 use crate::files::{
-    Document, FileError, Provenance, ProvenanceTable, SCHEMA, inside_folder, remove_owned,
-    sha256_hex, write_owned, write_owned_toml,
+    Document, FileError, Provenance, ProvenanceTable, inside_folder, remove_owned, sha256_hex,
+    write_owned, write_owned_toml,
 };
 use crate::quantity::{
     BEAM_EXPONENT, DIRECTION, INTENSITY, POSITION_SIGMA_MM, Problem, check_light_place,
@@ -13,6 +13,9 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use weavelight_calibration::description::{DirectionalLight, Image, Light, PointLight};
+
+/// The schema of `lights.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// The file's name in a calibration folder.
 pub const LIGHTS_FILE: &str = "lights.toml";

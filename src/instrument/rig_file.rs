@@ -1,7 +1,7 @@
 //! `rig.toml`: the keys of the format, to and from [`Rig`].
 
 use super::{CameraKind, Controller, LIGHT_COUNT, Rig, RigCamera, RigLight, RigLightPlace};
-use crate::files::{Document, FileError, SCHEMA, write_toml};
+use crate::files::{Document, FileError, write_toml};
 use crate::quantity::{
     CAMERA_HEIGHT_MM, DIRECTION, FOCAL_LENGTH_MM, PIXEL_PITCH_UM, POSITION_SIGMA_MM, Problem,
     check_light_place, check_side, check_view,
@@ -9,6 +9,9 @@ use crate::quantity::{
 use nalgebra::{Point3, UnitVector3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// The schema of `rig.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// How well a ruler places a light where the file does not say.
 const RULER_SIGMA_MM: f64 = 10.0;

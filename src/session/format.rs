@@ -3,7 +3,7 @@
 use super::check::check_manifest;
 use super::{Board, Encoding, FrameEntry, Kind, MANIFEST, Patch, Session, SessionError, Target};
 use crate::files::{
-    Document, FileError, SCHEMA, datetime_from_timestamp, inside_folder, timestamp_from_datetime,
+    Document, FileError, datetime_from_timestamp, inside_folder, timestamp_from_datetime,
     write_toml,
 };
 use crate::quantity::DIRECTION;
@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use toml::value::Datetime;
 use weavelight_calibration::description::{Cfa, Plane};
+
+/// The schema of `session.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -3,7 +3,7 @@
 
 use super::table::{TableTable, lying_from_table, table_from_lying};
 use super::{Flaws, Instrument, Lying, Material, Options, SimulateError};
-use crate::files::{Document, FileError, SCHEMA, Setting, write_toml};
+use crate::files::{Document, FileError, Setting, write_toml};
 use crate::instrument::{Rig, RigLightPlace};
 use crate::quantity::{DIRECTION, check_light_place};
 use nalgebra::{Point3, UnitVector3, Vector3};
@@ -12,6 +12,9 @@ use std::path::{Path, PathBuf};
 use weavelight_calibration::description::Light;
 use weavelight_sim::cloth::{Preset, Structure};
 use weavelight_sim::render::Fabric;
+
+/// The schema of `scene.toml` that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// Its name, beside `rig.toml`.
 pub const SCENE_FILE: &str = "scene.toml";

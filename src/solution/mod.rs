@@ -2,7 +2,10 @@
 
 mod report;
 
-pub use report::{AlbedoReport, DeviceReport, InputFolders, PlaneReport, Report, ResidualFile};
+pub use report::{
+    AlbedoReport, DeviceReport, InputFolders, PlaneReport, Report, ResidualFile,
+    SCHEMA as REPORT_SCHEMA,
+};
 
 use crate::files::{FileError, OutputKind};
 use std::path::{Path, PathBuf};

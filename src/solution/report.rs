@@ -1,8 +1,11 @@
-use crate::files::{FileError, Input, SCHEMA, read_input_text, write_atomic};
+use crate::files::{FileError, Input, read_input_text, write_atomic};
 use crate::quantity::{DIRECTION, MM_PER_PX, Problem, SURFACE_MM, check_side};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+
+/// The schema of `report.json` that this version reads and writes.
+pub const SCHEMA: i64 = 1;
 
 /// `report.json`: what a solve says of itself. Keys that this version does not know are passed over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -17,13 +17,15 @@ use super::progress::{Progress, Stage};
 use super::residual::ResidualFiles;
 use super::scene::{Exposure, Scene};
 use super::swatch::find_swatch;
-use crate::files::{PROGRAM, SCHEMA, StagedFolder, write_atomic};
+use crate::files::{PROGRAM, StagedFolder, write_atomic};
 use crate::instrument::{CAMERA_FILE, Calibration, MeasuredCamera, write_camera};
 use crate::machine::Pool;
 use crate::photometry::{Method, Outcome};
 use crate::raw::preview;
 use crate::session::Session;
-use crate::solution::{InputFolders, OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, Report};
+use crate::solution::{
+    InputFolders, OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, REPORT_SCHEMA, Report,
+};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -283,7 +285,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         .as_ref()
         .map(|camera| if undistorted { pinhole(camera) } else { camera.clone() });
     Report {
-        schema: SCHEMA,
+        schema: REPORT_SCHEMA,
         program: PROGRAM.to_owned(),
         method: method_name(options.method).to_owned(),
         size_px: [maps.mask.width, maps.mask.height],

@@ -5,8 +5,11 @@ use crate::place::Place;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use weavelight::calibrate::CheckReport;
-use weavelight::files::{FileError, SCHEMA, read_input_text, sha256_of_file, write_atomic};
+use weavelight::files::{FileError, read_input_text, sha256_of_file, write_atomic};
 use weavelight::instrument::LIGHTS_FILE;
+
+/// The schema of the verdict's file that this version reads and writes.
+const SCHEMA: i64 = 1;
 
 /// What the sheet that the calibration has not seen says of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
