@@ -47,7 +47,9 @@ demo: packages-demo
 # nextest where it is there: it runs the tests of several executables side by side.
 test: packages-all firmware
 	@if cargo nextest --version >/dev/null 2>&1; then \
-	    cargo nextest run --locked --workspace --all-features --no-fail-fast; \
+	    cargo nextest run --locked --workspace --all-features --no-fail-fast; status=$$?; \
+	    .ci/slowest target/nextest/default/junit.xml; \
+	    exit $$status; \
 	else \
 	    cargo test --locked --workspace --all-features --lib --bins --tests --no-fail-fast; \
 	fi

@@ -154,8 +154,7 @@ fn home() -> PathBuf {
 }
 
 fn configuration_folder() -> PathBuf {
-    let base = std::env::var_os("XDG_CONFIG_HOME").map(PathBuf::from).filter(|p| p.is_absolute());
-    base.unwrap_or_else(|| home().join(".config")).join("weavelight")
+    weavelight::machine::config_folder().unwrap_or_else(|| home().join(".config/weavelight"))
 }
 
 #[cfg(test)]

@@ -25,21 +25,9 @@ pub struct Band {
     variance: Vec<[VarianceModel; 2]>,
 }
 
-/// Random numbers (xorshift).
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Nearly normal: the sum of four.
-    fn gauss(&mut self) -> f64 {
-        ((0..4).map(|_| self.uniform()).sum::<f64>() - 2.0) * 3.0_f64.sqrt()
-    }
+/// Nearly normal: the sum of four.
+fn gauss(random: &mut fastrand::Rng) -> f64 {
+    ((0..4).map(|_| random.f64()).sum::<f64>() - 2.0) * 3.0_f64.sqrt()
 }
 
 fn light_positions(count: usize) -> Vec<Vector3<f64>> {
@@ -77,25 +65,25 @@ impl Band {
         // The same at both ends: the samples below are made with one row's light vectors.
         let row = field_row(&positions, 10.0);
         let field = [row.clone(), row];
-        let mut random = Random(0x9e37_79b9_7f4a_7c15);
+        let mut random = fastrand::Rng::with_seed(0x9e37_79b9_7f4a_7c15);
         let mut frames = vec![vec![0_u16; rows * WIDTH]; lights];
         let nodes = FieldRow { step: STEP, vectors: &field[0], lights };
         for place in 0..rows * WIDTH {
             let column = place % WIDTH;
             let (a, b) = ((0.4 * column as f64).sin(), (0.23 * (place / WIDTH) as f64).cos());
             let g = 0.5 * Vector3::new(0.5 * a, 0.5 * b, 1.0).normalize();
-            let spoilt = if random.uniform() < failing {
-                (random.uniform() * lights as f64) as usize
+            let spoilt = if random.f64() < failing {
+                (random.f64() * lights as f64) as usize
             } else {
                 lights
             };
             for (i, frame) in frames.iter_mut().enumerate() {
                 let mut y = g.dot(&nodes.at(column, i)).max(0.0);
                 if i == spoilt {
-                    y *= if random.uniform() < 0.5 { 0.1 } else { 1.6 };
+                    y *= if random.f64() < 0.5 { 0.1 } else { 1.6 };
                 }
                 let signal = y * f64::from(FULL) / 2.0;
-                let noise = (signal / ELECTRONS_PER_DN + 3.0).sqrt() * random.gauss();
+                let noise = (signal / ELECTRONS_PER_DN + 3.0).sqrt() * gauss(&mut random);
                 frame[place] =
                     (f64::from(BLACK) + signal + noise).round().clamp(0.0, 16_383.0) as u16;
             }

@@ -1,6 +1,6 @@
 //! Panels with two logarithmic axes, as SVG.
 
-use std::fmt::Write;
+use maud::{Markup, html};
 
 /// Size of a panel, and what its axes leave for labels.
 const WIDTH: f64 = 460.0;
@@ -51,54 +51,41 @@ pub(super) fn svg(panels: &[Panel]) -> String {
     let columns = panels.len().clamp(1, COLUMNS);
     let rows = panels.len().div_ceil(columns).max(1);
     let (width, height) = (columns as f64 * WIDTH, rows as f64 * HEIGHT);
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\" \
-         font-family=\"sans-serif\" font-size=\"11\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    );
-    for (k, panel) in panels.iter().enumerate() {
-        let (x, y) = ((k % columns) as f64 * WIDTH, (k / columns) as f64 * HEIGHT);
-        put(&mut out, format_args!("<g transform=\"translate({x} {y})\">"));
-        panel.draw(&mut out);
-        put(&mut out, format_args!("</g>"));
-    }
-    out.push_str("</svg>\n");
-    out
+    let corner = |k: usize| ((k % columns) as f64 * WIDTH, (k / columns) as f64 * HEIGHT);
+    let picture = html! {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox={ "0 0 " (width) " " (height) }
+            width=(width) height=(height) font-family="sans-serif" font-size="11" {
+            rect width="100%" height="100%" fill="white" {}
+            @for (k, panel) in panels.iter().enumerate() {
+                @let (x, y) = corner(k);
+                g transform={ "translate(" (x) " " (y) ")" } { (panel.draw()) }
+            }
+        }
+    };
+    picture.into_string() + "\n"
 }
 
-fn put(out: &mut String, line: std::fmt::Arguments) {
-    // Writing to a String does not fail.
-    let _ = writeln!(out, "{line}");
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+/// A coordinate, as short as a pixel asks for.
+fn px(value: f64) -> String {
+    format!("{value:.1}")
 }
 
 impl Panel {
-    fn draw(&self, out: &mut String) {
+    fn draw(&self) -> Markup {
         let scales = self.scales();
-        put(
-            out,
-            format_args!(
-                "<text x=\"{LEFT}\" y=\"22\" font-size=\"13\" font-weight=\"bold\">{}</text>",
-                escaped(&self.title)
-            ),
-        );
-        self.draw_axes(out, &scales);
         let place = |p: &[f64; 2]| [scales[0].place(p[0]), scales[1].place(p[1])];
-        for line in &self.lines {
-            let points: Vec<String> =
-                line.points.iter().map(place).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-            put(
-                out,
-                format_args!(
-                    "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"/>",
-                    points.join(" "),
-                    line.color
-                ),
-            );
+        let points = |line: &Line| {
+            let points = line.points.iter().map(place);
+            points.map(|[x, y]| format!("{x:.1},{y:.1}")).collect::<Vec<_>>().join(" ")
+        };
+        html! {
+            text x=(LEFT) y="22" font-size="13" font-weight="bold" { (self.title) }
+            (self.axes(&scales))
+            @for line in &self.lines {
+                polyline points=(points(line)) fill="none" stroke=(line.color) stroke-width="1.5" {}
+            }
+            (self.draw_marks(&place))
         }
-        self.draw_marks(out, &place);
     }
 
     /// Horizontal and vertical, wide enough for everything.
@@ -113,73 +100,47 @@ impl Panel {
         ]
     }
 
-    fn draw_axes(&self, out: &mut String, [across, up]: &[Scale; 2]) {
+    fn axes(&self, [across, up]: &[Scale; 2]) -> Markup {
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
-        for value in across.ticks() {
-            let x = across.place(value);
-            put(out, format_args!("<path d=\"M{x:.1} {TOP}V{bottom}\" stroke=\"#e4e4e4\"/>"));
-            put(
-                out,
-                format_args!(
-                    "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{value}</text>",
-                    bottom + 15.0
-                ),
-            );
-        }
-        for value in up.ticks() {
-            let y = up.place(value);
-            put(out, format_args!("<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#e4e4e4\"/>"));
-            put(
-                out,
-                format_args!(
-                    "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{value}</text>",
-                    LEFT - 6.0,
-                    y + 4.0
-                ),
-            );
-        }
         let (middle, height) = (0.5 * (LEFT + right), 0.5 * (TOP + bottom));
-        put(
-            out,
-            format_args!(
-                "<path d=\"M{LEFT} {TOP}V{bottom}H{right}\" fill=\"none\" stroke=\"#444\"/>\
-                 <text x=\"{middle}\" y=\"{}\" text-anchor=\"middle\">{}</text>\
-                 <text transform=\"translate(14 {height}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-                HEIGHT - 12.0,
-                escaped(&self.axes[0]),
-                escaped(&self.axes[1])
-            ),
-        );
+        html! {
+            @for value in across.ticks() {
+                @let x = px(across.place(value));
+                path d={ "M" (x) " " (TOP) "V" (bottom) } stroke="#e4e4e4" {}
+                text x=(x) y=(bottom + 15.0) text-anchor="middle" { (value) }
+            }
+            @for value in up.ticks() {
+                @let y = up.place(value);
+                path d={ "M" (LEFT) " " (px(y)) "H" (right) } stroke="#e4e4e4" {}
+                text x=(LEFT - 6.0) y=(px(y + 4.0)) text-anchor="end" { (value) }
+            }
+            path d={ "M" (LEFT) " " (TOP) "V" (bottom) "H" (right) } fill="none" stroke="#444" {}
+            text x=(middle) y=(HEIGHT - 12.0) text-anchor="middle" { (self.axes[0]) }
+            text transform={ "translate(14 " (height) ") rotate(-90)" } text-anchor="middle" {
+                (self.axes[1])
+            }
+        }
     }
 
     /// Points, each with its name at a place that nothing else takes.
-    fn draw_marks(&self, out: &mut String, place: &dyn Fn(&[f64; 2]) -> [f64; 2]) {
+    fn draw_marks(&self, place: &dyn Fn(&[f64; 2]) -> [f64; 2]) -> Markup {
         let mut taken: Vec<Area> =
             self.marks.iter().map(|mark| Area::around(place(&mark.at), [5.0, 5.0])).collect();
-        for mark in &self.marks {
-            let [x, y] = place(&mark.at);
-            let fill = if mark.shape == Shape::Disc { mark.color } else { "white" };
-            put(
-                out,
-                format_args!(
-                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{}\" stroke-width=\"1.5\"/>",
-                    mark.color
-                ),
-            );
+        let mut label_of = |mark: &Mark| {
             let half = [0.5 * LETTER[0] * mark.label.chars().count() as f64, 0.5 * LETTER[1]];
-            let area = free_place([x, y], half, &taken);
-            put(
-                out,
-                format_args!(
-                    "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"{}\" \
-                     stroke=\"white\" stroke-width=\"3\" paint-order=\"stroke\">{}</text>",
-                    area.middle[0],
-                    area.middle[1] + 4.0,
-                    mark.color,
-                    escaped(&mark.label)
-                ),
-            );
+            let area = free_place(place(&mark.at), half, &taken);
             taken.push(area);
+            area.middle
+        };
+        html! {
+            @for mark in &self.marks {
+                @let [x, y] = place(&mark.at);
+                @let [label_x, label_y] = label_of(mark);
+                @let fill = if mark.shape == Shape::Disc { mark.color } else { "white" };
+                circle cx=(px(x)) cy=(px(y)) r="4" fill=(fill) stroke=(mark.color) stroke-width="1.5" {}
+                text x=(px(label_x)) y=(px(label_y + 4.0)) text-anchor="middle" fill=(mark.color)
+                    stroke="white" stroke-width="3" paint-order="stroke" { (mark.label) }
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// SHA-256 of bytes in memory, lower-case hexadecimal.
 pub fn sha256_hex(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
+    hex::encode(Sha256::digest(bytes))
 }
 
 /// SHA-256 of a file, read in pieces, lower-case hexadecimal.
@@ -20,14 +20,10 @@ pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
     loop {
         let count = file.read(&mut piece).map_err(failed)?;
         if count == 0 {
-            return Ok(hex(&hasher.finalize()));
+            return Ok(hex::encode(hasher.finalize()));
         }
         hasher.update(&piece[..count]);
     }
-}
-
-fn hex(digest: &[u8]) -> String {
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

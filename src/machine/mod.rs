@@ -2,11 +2,13 @@
 //! in a sentence, not in the middle of a picture.
 
 mod environment;
+mod folders;
 mod memory;
 mod quiet;
 mod threads;
 
 pub use environment::correct_environment;
+pub use folders::{cache_folder, config_folder, state_folder};
 pub use memory::{NoMemory, available_bytes, check_memory};
 pub use quiet::Quiet;
 pub use threads::{Pool, spawn, start, thread_count};

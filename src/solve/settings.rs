@@ -99,10 +99,7 @@ impl Settings {
 
 /// The file among the user's cached ones that remembers what was measured.
 fn device_memory() -> Option<PathBuf> {
-    let given = std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from);
-    let of_user = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache"));
-    let folder = given.filter(|path| path.is_absolute()).or_else(of_user)?;
-    Some(folder.join("weavelight").join("device.json"))
+    Some(crate::machine::cache_folder()?.join("device.json"))
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 use std::cmp::Ordering;
 
-/// Natural order: runs of digits compare as numbers, so that `gray.2` stands before `gray.10`.
+/// Natural order: runs of digits compare as numbers, so that `gray.2` stands before `gray.10`. Our own, because the crates round
+/// digits to a float: time stamps of 17 digits would come in any order.
 pub(super) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut rest_a, mut rest_b) = (a, b);
     while !rest_a.is_empty() && !rest_b.is_empty() {

@@ -11,6 +11,7 @@ pub use diagnose::{Diagnosis, FoundCamera, diagnose};
 
 use super::{Applied, Camera, CameraError, Description, Release, Settings, Shutter};
 use crate::files::FileError;
+use crate::machine::state_folder;
 use helper::{CallError, Helper};
 use protocol::{Answer, Fault, Moment, Opened, PROTOCOL, Request, Setup};
 use std::io;
@@ -81,12 +82,9 @@ fn beside_this_program() -> PathBuf {
     std::env::current_exe().map_or_else(|_| PathBuf::from(&name), |own| own.with_file_name(&name))
 }
 
-/// As the XDG base directories have it.
+/// The home that libgphoto2 gets, so that it does not write into the user's own settings.
 fn home() -> PathBuf {
-    let of_state = std::env::var_os("XDG_STATE_HOME").map(PathBuf::from);
-    let of_user = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".local/state"));
-    let base = of_state.filter(|path| path.is_absolute()).or_else(of_user);
-    base.unwrap_or_else(std::env::temp_dir).join("weavelight")
+    state_folder().unwrap_or_else(|| std::env::temp_dir().join("weavelight"))
 }
 
 /// A camera that libgphoto2 holds.
