@@ -8,6 +8,9 @@
     reason = "a test that cannot set its scene up has failed; figures are to be seen"
 )]
 
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "support/skip.rs"]
+mod skip;
 mod support;
 
 use std::fs;
@@ -322,8 +325,9 @@ fn on_a_disk(options: &str, test: impl FnOnce(&Home, &Path)) {
         .args(["-t", "tmpfs", "-o", options, "tmpfs"])
         .arg(&disk)
         .output();
-    if !mount.is_ok_and(|output| output.status.success()) {
-        eprintln!("not run: a disk of its own needs the right to mount one");
+    let mounted = mount.is_ok_and(|output| output.status.success());
+    let right = mounted.then_some(()).ok_or_else(|| "no right to mount a disk".to_owned());
+    if skip::need("mount", right).is_none() {
         return;
     }
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| test(&home, &disk)));

@@ -2,20 +2,18 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
 
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "support/skip.rs"]
+mod skip;
+
 use sha2::{Digest, Sha256};
-use std::path::PathBuf;
 use weavelight::raw::{Hint, Layout, Samples, decode, decode_uncropped};
 use weavelight_calibration::description::Cfa;
 
-/// A file of the test pictures; `None`, said aloud, where they are absent.
+/// A file of the real pictures; `None` where their tests are to be skipped.
 fn data(name: &str) -> Option<Vec<u8>> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let folder = std::env::var_os("WEAVELIGHT_DATA").map_or_else(beside, PathBuf::from);
-    let bytes = std::fs::read(folder.join(name)).ok();
-    if bytes.is_none() {
-        println!("not run: {name} is not in WEAVELIGHT_DATA or ../shared/data");
-    }
-    bytes
+    let path = skip::real_pictures(env!("CARGO_MANIFEST_DIR"), name)?;
+    Some(std::fs::read(path).unwrap())
 }
 
 fn sha256_le(samples: &[u16]) -> String {

@@ -8,6 +8,9 @@
     reason = "a test that cannot set its scene up has failed; figures are to be seen"
 )]
 
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "support/skip.rs"]
+mod skip;
 mod support;
 
 use std::path::{Path, PathBuf};
@@ -20,14 +23,7 @@ use weavelight_calibration::description::Image;
 const TOLERANCE_DEG: f64 = 0.1;
 
 fn data(folder: &str) -> Option<PathBuf> {
-    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let root = std::env::var_os("WEAVELIGHT_DATA").map_or(beside, PathBuf::from);
-    let folder = root.join(folder);
-    if !folder.is_dir() {
-        eprintln!("not run: {} is not there", folder.display());
-        return None;
-    }
-    Some(folder)
+    skip::real_pictures(env!("CARGO_MANIFEST_DIR"), folder)
 }
 
 fn expect(case: &str, found: f64, expected: f64) {

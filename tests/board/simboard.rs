@@ -1,5 +1,9 @@
 //! The simulated board: the real firmware in libsimavr, in a process of its own.
 
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "../support/skip.rs"]
+pub(crate) mod skip;
+
 use crate::exchange::filled_in;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -19,21 +23,20 @@ fn firmware_folder() -> PathBuf {
     firmware.find(|firmware| firmware.is_dir()).unwrap()
 }
 
-/// Builds firmware and simulated board, or says what is missing.
-fn build() -> bool {
-    static BUILT: OnceLock<bool> = OnceLock::new();
-    *BUILT.get_or_init(|| {
+/// Builds firmware and simulated board.
+fn build() -> Result<(), String> {
+    static BUILT: OnceLock<Result<(), String>> = OnceLock::new();
+    BUILT.get_or_init(|| {
         let needed = ["/usr/bin/avr-gcc", "/usr/include/simavr/sim_avr.h", "/usr/include/libelf.h", BOOTLOADER];
         if let Some(missing) = needed.iter().find(|path| !Path::new(path).exists()) {
-            println!("not run: {missing} is missing; `make test` installs it (gcc-avr, avr-libc, arduino-core-avr, libsimavr-dev, libelf-dev)");
-            return false;
+            return Err(format!("{missing} is missing; `make test` installs it (gcc-avr, avr-libc, arduino-core-avr, libsimavr-dev, libelf-dev)"));
         }
         // Several test processes may come here at once.
         let make = Command::new("flock").arg(firmware_folder()).args(["make", "-s", "-C"]).arg(firmware_folder()).output();
         let make = make.unwrap();
         assert!(make.status.success(), "make -C firmware: {}", String::from_utf8_lossy(&make.stderr));
-        true
-    })
+        Ok(())
+    }).clone()
 }
 
 /// The process and its control socket. It ends with this value, whatever happens: its standard input closes.
@@ -45,9 +48,7 @@ pub(crate) struct SimBoard {
 
 impl SimBoard {
     fn start(options: &[&str]) -> Option<Self> {
-        if !build() {
-            return None;
-        }
+        skip::need("board", build())?;
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("control");
         let build = firmware_folder().join("build");

@@ -1,6 +1,7 @@
 //! From pictures to a calibration that holds on sheets the fit has not seen.
 
 use super::bench::{Bench, SIX_SHEETS, WHITE, quiet};
+use super::skip;
 use std::path::{Path, PathBuf};
 use weavelight::calibrate::{self, CameraOptions, StepState};
 use weavelight::instrument::Calibration;
@@ -87,18 +88,9 @@ fn the_wizard_asks_for_one_thing_at_a_time() {
     assert!(status.exposure.iter().any(|advice| advice.contains("times longer")), "{status:?}");
 }
 
-/// The real pictures: `WEAVELIGHT_DATA`, else `../shared/data`.
+/// Pictures of a real board.
 fn real_pictures() -> Option<PathBuf> {
-    let folder = std::env::var_os("WEAVELIGHT_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let chess = folder.join("chess-left");
-    if chess.is_dir() {
-        return Some(chess);
-    }
-    println!("not run: {} is not there", chess.display());
-    None
+    skip::real_pictures(env!("CARGO_MANIFEST_DIR"), "chess-left")
 }
 
 #[test]

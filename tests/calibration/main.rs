@@ -18,3 +18,6 @@ mod figures;
 mod inputs;
 mod mismatches;
 mod refusals;
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "../support/skip.rs"]
+mod skip;

@@ -3,7 +3,7 @@
 use crate::laboratory::{
     Fault, Laboratory, Line, Mishap, SETTINGS, SMALL, none, once, prerendered,
 };
-use crate::simboard::SimBoard;
+use crate::simboard::{SimBoard, skip};
 use crate::table::{Case, cases};
 use rustix::process::{Pid, Signal, kill_process};
 use serialport::SerialPort;
@@ -425,11 +425,9 @@ fn on_a_small_disk(laboratory: &Laboratory, size: &str, meanwhile: &str) -> Outc
         Some(1) if said.contains("error: ") => {
             Some(Err(said.lines().filter(|line| line.starts_with("error: ")).collect()))
         }
+        Some(99) => skip::need("unshare", Err(format!("no small disk can be mounted: {said}"))),
         Some(98) => panic!("did not resume: {said}"),
-        _ => {
-            println!("not run: no small disk can be mounted here: {said}");
-            None
-        }
+        status => panic!("a full disk was not noticed ({status:?}): {said}"),
     }
 }
 

@@ -1,10 +1,11 @@
 //! Real pictures: two objects of DiLiGenT (Shi et al. 2016) under ten lights. Neither is Lambertian, so model error rules.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::Vector3;
 
 use super::scene::{Solved, angle_deg};
+use super::skip;
 use crate::photometry::{
     FieldRow, Method, NoiseEvidence, NoiseSample, RowInput, RowSolver, VarianceModel,
     estimate_noise,
@@ -18,11 +19,6 @@ struct Object {
     width: usize,
 }
 
-fn data() -> PathBuf {
-    let named = std::env::var_os("WEAVELIGHT_DATA").map(PathBuf::from);
-    named.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"))
-}
-
 fn numbers(path: &Path) -> Vec<[f64; 3]> {
     let text = std::fs::read_to_string(path).unwrap();
     let line = |line: &str| {
@@ -33,11 +29,7 @@ fn numbers(path: &Path) -> Vec<[f64; 3]> {
 }
 
 fn load(name: &str) -> Option<Object> {
-    let folder = data().join("diligent").join(name);
-    if !folder.is_dir() {
-        println!("not run: {} is not there", folder.display());
-        return None;
-    }
+    let folder = skip::real_pictures(env!("CARGO_MANIFEST_DIR"), &format!("diligent/{name}"))?;
     let lights = numbers(&folder.join("light_directions.txt"));
     let intensities = numbers(&folder.join("light_intensities.txt"));
     let mask = image::open(folder.join("mask.png")).unwrap().into_luma8();
