@@ -3,6 +3,7 @@
 # make build   the release executables with every feature, in target/release
 # make install   them, with desktop entry and icon, below PREFIX (~/.local)
 # make firmware the light board's firmware, and the simulated board that tests run it in
+# make thorough the tests whose tables run in part otherwise, whole
 # make soak    light board and host for fifteen minutes over a bad wire
 # make kills   the program killed two hundred times while it scans, at the simulated board
 # make attacks mutated files, kills and errors at system calls, two processes on every output, by the thousand
@@ -27,7 +28,7 @@ FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsima
 # Kills and errors at chosen system calls.
 ATTACK_PACKAGES := strace
 
-.PHONY: demo test build install bench soak kills attacks scan-timing tether-timing firmware packages-demo packages-all packages-firmware
+.PHONY: demo test thorough build install bench soak kills attacks scan-timing tether-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -63,6 +64,10 @@ test: packages-all firmware
 	    cargo test --locked --workspace --all-features --lib --bins --tests --no-fail-fast; \
 	fi
 	cargo test --locked --workspace --all-features --doc --quiet
+
+# Every case of the tables of which `make test` runs a share.
+thorough: packages-all firmware
+	WEAVELIGHT_THOROUGH=1 cargo test --locked --workspace --all-features --test swatch --test calibration
 
 build: packages-all
 	cargo build --release --locked --workspace --all-features

@@ -12,3 +12,6 @@ mod layouts;
 mod outline;
 mod photograph;
 mod swapped_lights;
+#[allow(unreachable_pub, reason = "test programs share it")]
+#[path = "../support/thorough.rs"]
+mod thorough;

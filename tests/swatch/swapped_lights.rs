@@ -2,6 +2,7 @@
 //! nothing is wrong.
 
 use crate::photograph::{Field, LIGHTS, Scan};
+use crate::thorough;
 use weavelight::simulate::Material;
 use weavelight::solve::{Scene, leave_out_what_adds_nothing};
 use weavelight_sim::cloth::Preset;
@@ -12,10 +13,11 @@ fn swap(scene: &mut Scene, a: usize, b: usize) {
     scene.lights[a].exposures = others;
 }
 
-/// Pairs that are not named, and lights that are suspected besides.
-fn missed(scene: &Scene) -> Vec<String> {
+/// Pairs that are not named, and lights that are suspected besides; of every four pairs the one whose turn it is.
+fn missed(scene: &Scene, turn: usize) -> Vec<String> {
     let mut missed = vec![];
-    for (a, b) in (0..LIGHTS).flat_map(|a| (a + 1..LIGHTS).map(move |b| (a, b))) {
+    let pairs = (0..LIGHTS).flat_map(|a| (a + 1..LIGHTS).map(move |b| (a, b)));
+    for (_, (a, b)) in pairs.enumerate().filter(|(k, _)| thorough::runs(*k, 4, turn)) {
         let mut scene = scene.clone();
         swap(&mut scene, a, b);
         let warnings = leave_out_what_adds_nothing(&mut scene).unwrap();
@@ -30,13 +32,13 @@ fn missed(scene: &Scene) -> Vec<String> {
 #[test]
 fn any_swapped_pair_is_named_on_every_cloth() {
     let mut all = vec![];
-    for preset in Preset::ALL {
+    for (cloth, preset) in Preset::ALL.into_iter().enumerate() {
         for (field, seed) in [(Field::Close, 1), (Field::Whole, 2)] {
             let material = Material { preset, ..Material::default() };
             let scan = Scan::new(field, [264, 176], material, |options| options.seed = seed);
             let (scene, warnings) = scan.load();
-            let mut wrong = missed(&scene);
-            println!("{} {field:?}: {} of 45 missed", preset.name(), wrong.len());
+            let mut wrong = missed(&scene, cloth + seed as usize);
+            println!("{} {field:?}: {} missed", preset.name(), wrong.len());
             wrong.extend(warnings.iter().map(|warning| format!("nothing swapped: {warning}")));
             all.extend(wrong.into_iter().map(|text| format!("{} {field:?} {text}", preset.name())));
         }
