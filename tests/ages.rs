@@ -42,7 +42,8 @@ fn every_solution_opens_as_what_it_is() {
         assert_eq!(solution.report.albedo, None, "{name}: an albedo as it appears");
         assert_eq!((solution.report.solved, solution.report.scale), (384, 1), "{name}");
         let home = home_with(name);
-        let again = "compare old/maps/normal.exr old/maps/normal.exr --mask old/maps/mask.png --json";
+        let again =
+            "compare old/maps/normal.exr old/maps/normal.exr --mask old/maps/mask.png --json";
         let figures = home.run(again).json();
         assert_eq!(figures["pixels"], 384, "{name}");
         assert_eq!(figures["max_deg"].as_f64().unwrap(), 0.0, "{name}");
