@@ -56,24 +56,6 @@ pub(crate) const CONVERT_TO_DNG: &str =
 /// Why a frame's file gave no frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file is missing or cannot be read.
-    #[error("{}: {}", path.display(), crate::files::read_advice(source))]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file is not the one that was captured.
-    #[error("{}: altered since it was captured (SHA-256 {found}..., recorded {expected}...); restore the original", path.display())]
-    Altered {
-        /// The file.
-        path: PathBuf,
-        /// First digits of the hash in the manifest.
-        expected: String,
-        /// First digits of the file's hash.
-        found: String,
-    },
     /// The file is there but is no usable frame.
     #[error("{}: {source}", path.display())]
     Decode {

@@ -19,7 +19,6 @@ mod nef;
 mod nikon_bits;
 mod picture;
 mod preview;
-mod read;
 mod sensor;
 mod tagged;
 mod tags;
@@ -34,7 +33,6 @@ pub use frame::{Assumed, Frame, Layout, Metadata, Numbers, Samples};
 pub use hint::{Encoding, Hint};
 pub use picture::{contradictions, mixed_encodings};
 pub use preview::preview;
-pub use read::{Source, read, read_all, read_source};
 
 use crate::raster::{Format, PictureError, not_a_picture};
 use sensor::Stored;

@@ -5,5 +5,4 @@ mod ljpeg;
 mod mutations;
 mod nef;
 mod pictures;
-mod reading;
 mod tagged;
