@@ -7,7 +7,7 @@
 //! - [`machine`]: threads and memory, as far as they are to be had
 //! - [`quantity`]: the range of every number by its unit
 //! - [`raster`]: float and integer pictures (EXR, PNG, TIFF, JPEG) in and out
-//! - [`raw`]: a frame as the sensor wrote it
+//! - [`raw`]: a frame as the sensor wrote it; [`linear`]: its raw numbers as linear light
 //! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
 //!   [`solution`]: the folder that a solve writes
 //! - [`albedo`]: the colours of a solved mosaic
@@ -28,6 +28,7 @@ pub mod doctor;
 pub mod files;
 pub mod gpu;
 pub mod instrument;
+pub mod linear;
 pub mod machine;
 pub mod photometry;
 pub mod quantity;

@@ -47,7 +47,7 @@ fn samples(folder: &Path, preset: Preset) -> Vec<Vec<Sample>> {
     let eye = scene.camera.as_ref().unwrap().camera_from_rig.inverse() * nalgebra::Point3::origin();
     let report = Report::read(&wanted.out.join("report.json")).unwrap();
     assert_eq!(report.residuals.len(), scene.lights.len());
-    let of_light = |light: &solve::PhotographedLight| {
+    let of_light = |light: &weavelight::linear::PhotographedLight| {
         let exr = read_exr(&wanted.out.join(residual_exr(light.index))).unwrap();
         let residual = exr.channel("Y").unwrap();
         assert!(residual.iter().all(|value| value.is_finite()));

@@ -19,10 +19,11 @@
 use nalgebra::Vector3;
 use std::path::Path;
 use weavelight::compare::{NormalFigures, compare_normals};
+use weavelight::linear::{Exposure, PhotographedLight};
 use weavelight::photometry::Method;
 use weavelight::raw::{Frame, Layout, Samples, demosaic};
 use weavelight::simulate::{self, Instrument, Part};
-use weavelight::solve::{Exposure, Maps, PhotographedLight, Scene, load_scene, solve_scene};
+use weavelight::solve::{Maps, Scene, load_scene, solve_scene};
 use weavelight_calibration::description::{Cfa, Image};
 use weavelight_sim::cloth::{Preset, Relief, Structure};
 use weavelight_sim::render::{Shot, auto_exposure, shoot_with_truth};

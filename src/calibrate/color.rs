@@ -1,7 +1,6 @@
 //! `calibrate color`: levels, response, noise, white balance and colour from a grey or colour chart.
 
 use super::color_matrix::{color_patches, matrix};
-use super::frames::Levels;
 use super::inputs::{self, check_out};
 use super::lights::nominal_camera;
 use super::patches::{ChartFrame, ChartFrames, PatchStats, read_chart};
@@ -13,6 +12,7 @@ use crate::instrument::{
     CAMERA_FILE, COLOR_FILE, Calibration, Color, DEFECTS_FILE, Defects, Noise, Optics, Rig,
     write_color, write_defects,
 };
+use crate::linear::Levels;
 use crate::raw::Ceiling;
 use crate::session::{Kind, Patch, Session};
 use serde::Serialize;
@@ -235,11 +235,7 @@ fn load(options: &ColorOptions, rig: &Rig, progress: &Progress) -> Result<Chart,
 
 fn levels(chart: &Chart, color: &Color) -> Levels {
     let first = &chart.frames[0];
-    Levels::from_parts(
-        color.black_level.unwrap_or(first.black.map(f64::from)),
-        color.saturation_level.map_or(first.saturation.map(f64::from), |level| [level; 4]),
-        color.response.clone(),
-    )
+    Levels::new(first.black, first.saturation, color)
 }
 
 /// Highest share of the range that still counts as dark: whatever bends the response does not show there.

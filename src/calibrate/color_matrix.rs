@@ -1,8 +1,8 @@
 //! The colour matrix: from the patches of a colour chart, else from the camera's own.
 
 use super::color::{Chart, light_of, neutral};
-use super::frames::Levels;
 use crate::instrument::{Rig, RigLightPlace};
+use crate::linear::Levels;
 use crate::session::Patch;
 use nalgebra::{Matrix3, UnitVector3, Vector3};
 use palette::color_difference::Ciede2000;

@@ -1,7 +1,7 @@
 //! Hot and dead photosites, from all frames of the chart together.
 
-use super::frames::raw_at;
 use crate::instrument::Defects;
+use crate::linear::{range_between, raw_at};
 use crate::raw::Frame;
 use rayon::prelude::*;
 
@@ -53,8 +53,7 @@ fn odd_ones(
         };
         (0..width).map(at).collect()
     };
-    let range = f64::from(first.saturation[0] - first.black[0]) * frames.len() as f64;
-    let range = if range.is_finite() { range } else { frames.len() as f64 };
+    let range = f64::from(range_between(first.black[0], first.saturation[0])) * frames.len() as f64;
     let row = |y: usize| -> Vec<([u32; 2], bool)> {
         let rows = [y - 2, y, y + 2].map(sum_of_row);
         let judge = |x: usize| {

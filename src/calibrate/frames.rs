@@ -1,16 +1,11 @@
 //! Frames of targets: read, made linear, averaged over rectangles.
 
 use super::CalibrateError;
-use crate::instrument::{Color, Defects};
-use crate::raw::{Frame, Layout, Samples};
-use crate::session::FrameEntry;
+use crate::instrument::Defects;
+use crate::linear::{Levels, raw_at};
+use crate::raw::{Frame, Layout};
 use std::path::Path;
 use weavelight_calibration::description::Image;
-
-/// Exposure time times ISO / 100.
-pub(super) fn seconds_at_iso_100(entry: &FrameEntry) -> f64 {
-    entry.exposure_s * entry.iso / 100.0
-}
 
 /// The frame must have the size that `stated_in` says.
 pub(super) fn check_size(
@@ -25,64 +20,6 @@ pub(super) fn check_size(
     }
     let (frame, rig) = (path.to_owned(), stated_in.to_owned());
     Err(CalibrateError::WrongSize { frame, found, rig, expected })
-}
-
-/// How raw numbers become light: per place of the 2 x 2 cell.
-#[derive(Clone, Debug)]
-pub(super) struct Levels {
-    pub(super) black: [f64; 4],
-    pub(super) saturation: [f64; 4],
-    /// Raw number from which samples are clipped below the end of the range; infinite where they are not.
-    clip: f64,
-    response: Vec<f64>,
-}
-
-impl Levels {
-    /// The calibration's levels override the file's; a format without a ceiling counts 1.0 as full scale.
-    pub(super) fn of(frame: &Frame, color: &Color) -> Self {
-        let black = color.black_level.unwrap_or(frame.black.map(f64::from));
-        let stated =
-            color.saturation_level.map_or(frame.saturation.map(f64::from), |level| [level; 4]);
-        let clip = color.clip_level.unwrap_or(f64::INFINITY);
-        Self { black, saturation: stated, clip, response: color.response.clone() }
-    }
-
-    pub(super) fn from_parts(black: [f64; 4], saturation: [f64; 4], response: Vec<f64>) -> Self {
-        Self { black, saturation, clip: f64::INFINITY, response }
-    }
-
-    pub(super) fn range(&self, place: usize) -> f64 {
-        let range = self.saturation[place] - self.black[place];
-        if range.is_finite() { range } else { 1.0 }
-    }
-
-    /// Share of the range, before the response curve, that is left below the clipping.
-    pub(super) fn usable_share(&self) -> f64 {
-        (0..4).map(|place| (self.clip - self.black[place]) / self.range(place)).fold(1.0, f64::min)
-    }
-
-    /// Light as a fraction of full scale of a raw number; `None` where it is saturated.
-    pub(super) fn linear(&self, raw: f64, place: usize) -> Option<f64> {
-        let usable = raw.is_finite() && raw < self.saturation[place].min(self.clip);
-        usable.then(|| self.bent((raw - self.black[place]) / self.range(place)))
-    }
-
-    /// The response curve.
-    fn bent(&self, x: f64) -> f64 {
-        match self.response.as_slice() {
-            [] | [0.0, 1.0] => x,
-            response => response.iter().rev().fold(0.0, |sum, c| sum * x + c),
-        }
-    }
-}
-
-/// The raw number of one sample.
-pub(super) fn raw_at(frame: &Frame, x: usize, y: usize, channel: usize) -> f64 {
-    let at = (y * frame.width + x) * frame.layout.channels() + channel;
-    match &frame.samples {
-        Samples::U16(samples) => f64::from(samples[at]),
-        Samples::F32(samples) => f64::from(samples[at]),
-    }
 }
 
 /// A rectangle of pixels: x0, y0 inside, x1, y1 outside.

@@ -2,9 +2,9 @@
 
 use super::CalibrateError;
 use super::defective;
-use super::frames::{Levels, raw_at, seconds_at_iso_100};
 use super::inputs::{exposure_warning, fingerprint};
 use crate::instrument::Defects;
+use crate::linear::{Levels, raw_at, seconds_at_iso_100};
 use crate::raw::{Ceiling, Frame, Histogram, Layout, Metadata};
 use crate::session::{FrameEntry, Patch, Session};
 use rayon::prelude::*;
@@ -99,7 +99,7 @@ pub(super) fn read_chart(
     let clip = ceiling.map_or(f32::INFINITY, |ceiling| ceiling.level.into());
     let of_frame = |(entry, (frame, cfa)): (&FrameEntry, &(Frame, Cfa))| ChartFrame {
         light: entry.light,
-        exposure: seconds_at_iso_100(entry),
+        exposure: seconds_at_iso_100(entry.exposure_s, entry.iso),
         patches: patches.iter().map(|patch| stats(frame, patch, &defects)).collect(),
         cfa: *cfa,
         black: frame.black,

@@ -1,13 +1,14 @@
 //! What one white sheet showed: cells over the frame, every light's mean signal in each.
 
 use super::boards::{self, shape_of};
-use super::frames::{Levels, Mean, Rect, check_size, grey_picture, mean_in, seconds_at_iso_100};
+use super::frames::{Mean, Rect, check_size, grey_picture, mean_in};
 use super::inputs::{exposure_warning, fingerprint, no_copies};
 use super::levels;
 use super::moved::Pattern;
 use super::sheet_pose::{Pose, pose_of};
 use super::{CalibrateError, Progress};
 use crate::instrument::{CAMERA_FILE, Color, Defects, Optics};
+use crate::linear::{Levels, seconds_at_iso_100};
 use crate::raw::{Ceiling, Histogram};
 use crate::session::{Board, FrameEntry, Session};
 use nalgebra::Vector3;
@@ -221,7 +222,7 @@ fn average(
     Ok(Averaged {
         light: entry.light,
         drift_check: entry.drift_check,
-        exposure: seconds_at_iso_100(entry),
+        exposure: seconds_at_iso_100(entry.exposure_s, entry.iso),
         cells: rects.iter().map(|rect| mean_in(&frame, &levels, known.defects, *rect)).collect(),
         pattern: Pattern::of(&frame),
         board: board.and_then(Result::ok).map(|corners| corners.refined),

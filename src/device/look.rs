@@ -1,6 +1,8 @@
 //! What one frame shows, in a few numbers.
 
-use crate::raw::{Frame, Layout, Samples};
+use crate::instrument::Color;
+use crate::linear::Reading;
+use crate::raw::{Frame, Layout};
 
 /// Samples that the figures rest on: enough for a tenth of a per cent, few enough for milliseconds.
 const SAMPLES: usize = 400_000;
@@ -91,27 +93,17 @@ pub(super) fn difference(a: &[f64], b: &[f64]) -> f64 {
 struct Grid<'a> {
     frame: &'a Frame,
     channels: usize,
-    /// 1 / (saturation - black), per place of the cell.
-    scale: [f32; 4],
+    reading: Reading<'a>,
 }
 
 impl<'a> Grid<'a> {
     fn new(frame: &'a Frame) -> Self {
-        let scale = std::array::from_fn(|k| {
-            let range = frame.saturation[k] - frame.black[k];
-            if range.is_finite() && range > 0.0 { 1.0 / range } else { 1.0 }
-        });
-        Self { frame, channels: frame.layout.channels(), scale }
+        let reading = Reading::new(frame, &Color::default());
+        Self { frame, channels: frame.layout.channels(), reading }
     }
 
     fn value(&self, x: usize, y: usize, channel: usize) -> f32 {
-        let index = (y * self.frame.width + x) * self.channels + channel;
-        let raw = match &self.frame.samples {
-            Samples::U16(samples) => f32::from(samples[index]),
-            Samples::F32(samples) => samples[index],
-        };
-        let place = (y & 1) * 2 + (x & 1);
-        let value = (raw - self.frame.black[place]) * self.scale[place];
+        let value = self.reading.share(x, y, channel);
         if value.is_finite() { value } else { 0.0 }
     }
 
@@ -203,7 +195,7 @@ fn channel(name: &'static str, mut values: Vec<f32>) -> Channel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raw::Metadata;
+    use crate::raw::{Metadata, Samples};
     use weavelight_calibration::description::Cfa;
 
     fn frame(layout: Layout, value: impl Fn(usize, usize) -> u16) -> Frame {

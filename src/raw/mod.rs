@@ -18,7 +18,6 @@ mod metadata;
 mod nef;
 mod nikon_bits;
 mod picture;
-mod preview;
 mod sensor;
 mod tagged;
 mod tags;
@@ -32,7 +31,6 @@ pub use error::{DecodeError, ReadError};
 pub use frame::{Assumed, Frame, Layout, Metadata, Numbers, Samples};
 pub use hint::{Encoding, Hint};
 pub use picture::{contradictions, mixed_encodings};
-pub use preview::preview;
 
 use crate::raster::{Format, PictureError, not_a_picture};
 use sensor::Stored;

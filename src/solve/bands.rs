@@ -3,11 +3,12 @@
 
 use super::field::{FieldRows, LightField};
 use super::maps::{Albedo, Counts, Maps};
-use super::noise::{AmbientNoise, LinearNoise, exposure_variances, merged_variance};
 use super::on_gpu::{OnGpu, TileRows};
 use super::residual::{ResidualRows, residual_row};
 use super::scene::Scene;
-use super::signal::{Normalizer, SignalRows};
+use crate::linear::{
+    AmbientNoise, LinearNoise, Normalizer, SignalRows, exposure_variances, variance_of_row,
+};
 use crate::photometry::{
     FieldRow, Method, Outcome, RowError, RowInput, RowOutput, RowSolver, Support, VarianceModel,
 };
@@ -94,16 +95,16 @@ impl<'a> Run<'a> {
     ) -> Self {
         let equal: Vec<Vec<f64>> =
             scene.lights.iter().map(|light| vec![1.0; light.exposures.len()]).collect();
-        let rate = Normalizer::new(scene, &equal).mean_ambient_rate();
+        let rate = Normalizer::new(&scene.photographs(), &equal).mean_ambient_rate();
         let ambient = AmbientNoise::new(&scene.ambient, rate, noise);
-        let exposure_variance = exposure_variances(scene, noise, ambient);
+        let exposure_variance = exposure_variances(&scene.photographs(), noise, ambient);
         let weights: Vec<Vec<f64>> =
             exposure_variance.iter().map(|of| exposure_weights(of)).collect();
         let variance = [0, 1].map(|parity| {
             let all = exposure_variance.iter().zip(&weights);
             all.map(|(of, weights)| variance_of_row(of, weights, parity, u64::MAX)).collect()
         });
-        let normalizer = Normalizer::new(scene, &weights);
+        let normalizer = Normalizer::new(&scene.photographs(), &weights);
         Self {
             scene,
             field,
@@ -466,25 +467,6 @@ fn exposure_weights(variance: &[[VarianceModel; 4]]) -> Vec<f64> {
         variance.iter().map(|places| places.iter().map(at_half).sum()).collect();
     let largest = weights.iter().copied().fold(0.0, f64::max);
     weights.iter().map(|weight| weight / largest).collect()
-}
-
-/// Variance at even and odd columns of a row, of the mean of those exposures whose bit is set.
-pub(crate) fn variance_of_row(
-    exposures: &[[VarianceModel; 4]],
-    weights: &[f64],
-    row_parity: usize,
-    used: u64,
-) -> [VarianceModel; 2] {
-    [0, 1].map(|column| {
-        let parts: Vec<(f64, VarianceModel)> = exposures
-            .iter()
-            .zip(weights)
-            .enumerate()
-            .filter(|(bit, _)| used >> (*bit).min(63) & 1 == 1)
-            .map(|(_, (places, &weight))| (weight, places[row_parity * 2 + column]))
-            .collect();
-        merged_variance(&parts)
-    })
 }
 
 /// Albedo of each channel of colour pictures: least squares over the samples that the normal rests on.

@@ -1,8 +1,8 @@
 //! How bright each frame is, in blocks of photosites: what tells a lit frame from a dark one, and an ambient frame from one
 //! that some light was on in.
 
-use super::scene::{Exposure, Scene};
-use super::sensor::Reading;
+use super::scene::Scene;
+use crate::linear::{Exposure, Reading};
 use crate::raw::{Layout, Samples};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -93,10 +93,10 @@ fn levels(scene: &Scene, reading: &Reading, corner: [usize; 2]) -> [f64; 3] {
     for [x, y] in photosites(scene, corner) {
         match scene.layout {
             Layout::Mosaic(cfa) => {
-                values[cfa.channel(x, y) as usize].push(reading.exact(x, y, 0));
+                values[cfa.channel(x, y) as usize].push(reading.at(x, y, 0));
             }
-            Layout::Grey => values[1].push(reading.exact(x, y, 0)),
-            Layout::Rgb => (0..3).for_each(|c| values[c].push(reading.exact(x, y, c))),
+            Layout::Grey => values[1].push(reading.at(x, y, 0)),
+            Layout::Rgb => (0..3).for_each(|c| values[c].push(reading.at(x, y, c))),
         }
     }
     values.map(median)
@@ -119,7 +119,7 @@ fn noise(scene: &Scene, reading: &Reading, corner: [usize; 2]) -> Option<f64> {
         if x < 2 || x + 2 >= scene.width {
             continue;
         }
-        let [before, here, after] = [x - 2, x, x + 2].map(|x| reading.exact(x, y, 0));
+        let [before, here, after] = [x - 2, x, x + 2].map(|x| reading.at(x, y, 0));
         let second = 2.0 * here - before - after;
         if second.is_finite() {
             sum += second * second / 6.0;

@@ -4,8 +4,8 @@ use super::SolveError;
 use super::copies::few;
 use super::field::LightField;
 use super::scene::Scene;
-use super::sensor::{Reading, intensity_of_places};
 use crate::instrument::{CAMERA_FILE, LIGHTS_FILE};
+use crate::linear::{Exposure, Reading, intensity_of_places};
 use crate::raw::{Frame, Layout};
 use nalgebra::{DMatrix, Vector3};
 
@@ -57,7 +57,7 @@ fn too_few(scene: &Scene) -> Result<(), SolveError> {
     })
 }
 
-fn check_range(scene: &Scene, exposure: &super::Exposure) -> Result<(), SolveError> {
+fn check_range(scene: &Scene, exposure: &Exposure) -> Result<(), SolveError> {
     let levels = Reading::new(&exposure.frame, &scene.color).levels();
     let wrong =
         levels.into_iter().find(|(black, saturation)| black.is_nan() || black >= saturation);
@@ -65,7 +65,7 @@ fn check_range(scene: &Scene, exposure: &super::Exposure) -> Result<(), SolveErr
     Err(SolveError::NoRange { path: exposure.path.clone(), black, saturation })
 }
 
-fn check_camera(scene: &Scene, first: &super::Exposure) -> Result<(), SolveError> {
+fn check_camera(scene: &Scene, first: &Exposure) -> Result<(), SolveError> {
     let size = |width, height| format!("{width} x {height}");
     match &scene.camera {
         Some(camera) if (camera.width_px, camera.height_px) != scene.size_px() => {

@@ -3,7 +3,8 @@
 
 use super::check::in_words;
 use super::error::SolveError;
-use super::scene::{Exposure, PhotographedLight, Scene};
+use super::scene::Scene;
+use crate::linear::{Exposure, PhotographedLight};
 use crate::raw::{Frame, Layout, Samples};
 use weavelight_calibration::description::Light;
 

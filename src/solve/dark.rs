@@ -3,7 +3,8 @@
 use super::brightness::Brightness;
 use super::copies::{few, name};
 use super::error::SolveError;
-use super::scene::{Exposure, Scene};
+use super::scene::Scene;
+use crate::linear::{Exposure, PhotographedLight};
 use weavelight_calibration::description::Light;
 
 /// The fewest lights that can be solved.
@@ -233,9 +234,7 @@ impl Bright {
     /// Whether the frames of all lights show one brightness at nearly every block, the ambient light not known. Far lights
     /// over a flat sheet may do so in earnest.
     fn all_alike(&self, scene: &Scene) -> bool {
-        let near = |light: &super::scene::PhotographedLight| {
-            matches!(light.calibrated.light, Light::Point(_))
-        };
+        let near = |light: &PhotographedLight| matches!(light.calibrated.light, Light::Point(_));
         if self.blocks() < 9 || !self.ambient.is_empty() || !scene.lights.iter().all(near) {
             return false;
         }

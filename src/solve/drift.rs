@@ -1,8 +1,8 @@
 //! Whether a light that was photographed twice stayed the same.
 
 use super::copies::{is_same_picture, name};
-use super::scene::{Exposure, Scene};
-use super::sensor::Reading;
+use super::scene::Scene;
+use crate::linear::{Exposure, Reading};
 
 /// Change of a light during the capture session that costs 0.1 degrees.
 const TOLERATED: f64 = 0.003;
@@ -52,7 +52,7 @@ fn median_ratio(scene: &Scene, first: &Exposure, second: &Exposure) -> Option<f6
     let mut ratios = vec![];
     for y in places(scene.height) {
         for x in places(scene.width) {
-            let (before, after) = (a.exact(x, y, 0), b.exact(x, y, 0));
+            let (before, after) = (a.at(x, y, 0), b.at(x, y, 0));
             if before > DARK && after > DARK {
                 ratios.push(
                     after / second.seconds_at_iso_100() / (before / first.seconds_at_iso_100()),

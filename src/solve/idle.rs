@@ -3,8 +3,8 @@
 use super::copies::{few, leave_out_copies, name};
 use super::dark::leave_out_dark_lights;
 use super::error::SolveError;
-use super::scene::{Exposure, Scene};
-use super::sensor::Reading;
+use super::scene::Scene;
+use crate::linear::{Exposure, Reading};
 use weavelight_calibration::description::Image;
 
 /// The fewest lights that can be solved.
@@ -52,7 +52,7 @@ fn clipped_sentence(light: usize, exposure: &Exposure) -> String {
 fn clips_everywhere(scene: &Scene, exposure: &Exposure) -> bool {
     let reading = Reading::new(&exposure.frame, &scene.color);
     let usable = |x: usize, y: usize| {
-        (0..scene.layout.channels()).all(|channel| reading.exact(x, y, channel).is_finite())
+        (0..scene.layout.channels()).all(|channel| reading.at(x, y, channel).is_finite())
     };
     let inside =
         |x: usize, y: usize| scene.mask.as_ref().is_none_or(|mask: &Image<bool>| *mask.at(x, y));

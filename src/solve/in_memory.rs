@@ -4,17 +4,16 @@ use super::SolveError;
 use super::bands::Run;
 use super::check::{check_frames, check_light_field};
 use super::device::{Chosen, Device, choose};
-use super::estimate::noise_of_residuals;
 use super::field::{LightField, Unseen};
 use super::idle::leave_out_idle_frames;
 use super::maps::Maps;
-use super::noise::{LinearNoise, full_scale};
 use super::on_gpu::{OnGpu, report_of};
 use super::progress::{Progress, Stage};
 use super::residual::ResidualRows;
 use super::scene::Scene;
 use super::witness::question;
 use crate::instrument::{CAMERA_FILE, Noise};
+use crate::linear::{LinearNoise, Surroundings, full_scale, noise_of_residuals};
 use crate::photometry::Method;
 use crate::solution::DeviceReport;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -141,11 +140,13 @@ pub(crate) fn unseen_pixel(scene: &Scene, unseen: Unseen) -> SolveError {
 
 /// The sensor's noise: as calibrated, else from the residuals of the pictures, else typical.
 pub(crate) fn noise(scene: &Scene, field: &LightField) -> LinearNoise {
-    let range = full_scale(scene);
+    let range = full_scale(&scene.photographs());
     if let Some(noise) = &scene.color.noise {
         return LinearNoise::from_electrons(noise, range);
     }
-    noise_of_residuals(scene, field).unwrap_or_else(|| {
+    let around =
+        Surroundings { mask: scene.mask.as_ref(), vectors: &|pixel: [f64; 2]| field.exact(pixel) };
+    noise_of_residuals(&scene.photographs(), around).unwrap_or_else(|| {
         let electrons_per_dn = TYPICAL_FULL_WELL_E / range;
         let typical =
             Noise { electrons_per_dn, read_noise_e: TYPICAL_READ_NOISE_E, kappa: TYPICAL_KAPPA };

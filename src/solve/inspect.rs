@@ -4,7 +4,7 @@
 use super::finish::convert;
 use super::maps::is_solved;
 use super::rows::Rows;
-use super::signal::SignalRows;
+use crate::linear::SignalRows;
 use crate::photometry::{Outcome, Support};
 use crate::raw::{Layout, demosaic};
 use nalgebra::Vector3;

@@ -4,8 +4,8 @@
 use super::bands::{Band, ReadRow, Run, Worker};
 use super::field::FieldRows;
 use super::maps::Counts;
-use super::signal::SignalRows;
 use crate::gpu::{Adapter, Flight, Gpu, GpuError, Tile, TileRow};
+use crate::linear::SignalRows;
 use crate::photometry::{
     CutRow, FieldRow, Method, Outcome, RowError, RowInput, RowOutput, RowSolver,
 };

@@ -8,9 +8,9 @@ use super::SolveError;
 use super::check::{check_frames, describe};
 use super::field::{FieldRows, LightField};
 use super::in_memory::light_field;
-use super::scene::{Exposure, Origin, PhotographedLight, Scene};
-use super::signal::{Normalizer, SignalRows};
+use super::scene::{Origin, Scene};
 use crate::instrument::Calibration;
+use crate::linear::{Exposure, Normalizer, PhotographedLight, SignalRows};
 use crate::photometry::{FieldRow, LightSet};
 use crate::raw::{Frame, Layout, demosaic};
 use nalgebra::{Matrix3, Vector3};
@@ -153,7 +153,7 @@ impl Accumulator {
     fn add_rows(&mut self, light: usize) -> Result<(), SolveError> {
         let scene = &self.scene;
         let field = light_field(scene)?;
-        let normalizer = Normalizer::new(scene, &[vec![1.0]]);
+        let normalizer = Normalizer::new(&scene.photographs(), &[vec![1.0]]);
         let (width, scale) = (self.width, self.scale);
         let mut channels = self.sums.iter_mut();
         let first = channels.next().into_iter().flat_map(|sums| sums.chunks_mut(width));

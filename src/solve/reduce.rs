@@ -2,9 +2,9 @@
 //! the same run as the full scene, it gives a preview at a fraction of the time.
 
 use super::preview::Scale;
-use super::scene::{Exposure, PhotographedLight, Scene};
-use super::sensor::{GREY, Reading};
+use super::scene::Scene;
 use crate::instrument::{Color, Noise};
+use crate::linear::{Exposure, GREY, PhotographedLight, Reading};
 use crate::raw::{Frame, Layout, Samples};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -3,7 +3,7 @@
 
 use super::bands::Run;
 use super::scene::Scene;
-use super::sensor::{GREY, Reading, intensity_of_places};
+use crate::linear::{Exposure, GREY, Reading, intensity_of_places};
 use crate::photometry::{Pixel, Samples, VarianceModel, solve_pixel};
 use crate::raw::Layout;
 use weavelight_calibration::gain::gain_at;
@@ -38,7 +38,7 @@ pub(crate) fn signal(
     let usable = |e: &usize| {
         !defective
             && (0..channels)
-                .all(|c| !Reading::new(&exposures[*e].frame, &scene.color).exact(x, y, c).is_nan())
+                .all(|c| !Reading::new(&exposures[*e].frame, &scene.color).at(x, y, c).is_nan())
     };
     let used: Vec<usize> = (0..exposures.len()).filter(usable).collect();
     let bits = used.iter().fold(0_u64, |bits, e| bits | 1 << e);
@@ -66,7 +66,7 @@ fn channel_signal(
     let (mut sum, mut total) = (0.0, 0.0);
     for &e in used {
         let exposure = &photographed.exposures[e];
-        let linear = Reading::new(&exposure.frame, &scene.color).exact(x, y, channel);
+        let linear = Reading::new(&exposure.frame, &scene.color).at(x, y, channel);
         let weight = run.weight(light, e);
         sum += weight * linear / (exposure.seconds_at_iso_100() * intensity);
         total += weight;
@@ -80,7 +80,7 @@ fn channel_signal(
 
 fn ambient_rate(scene: &Scene, x: usize, y: usize, channel: usize) -> f64 {
     let seconds: f64 = scene.ambient.iter().map(|e| e.seconds_at_iso_100()).sum();
-    let light = |e: &super::Exposure| Reading::new(&e.frame, &scene.color).exact(x, y, channel);
+    let light = |e: &Exposure| Reading::new(&e.frame, &scene.color).at(x, y, channel);
     if seconds > 0.0 { scene.ambient.iter().map(light).sum::<f64>() / seconds } else { 0.0 }
 }
 

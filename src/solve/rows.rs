@@ -7,7 +7,7 @@ use super::check::{check_frames, check_light_field};
 use super::field::FieldRows;
 use super::in_memory::{light_field, noise};
 use super::scene::Scene;
-use super::signal::SignalRows;
+use crate::linear::SignalRows;
 use crate::photometry::{Method, Outcome, RowInput, RowOutput};
 use rayon::prelude::*;
 use weavelight_calibration::description::Image;

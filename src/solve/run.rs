@@ -15,13 +15,14 @@ use super::options::{Grid, MaskChoice, Options, Outputs, Residuals, Reuse};
 use super::preview::Scale;
 use super::progress::{Progress, Stage};
 use super::residual::ResidualFiles;
-use super::scene::{Exposure, Scene};
+use super::scene::Scene;
 use super::swatch::find_swatch;
 use crate::files::{PROGRAM, StagedFolder, write_atomic};
 use crate::instrument::{CAMERA_FILE, Calibration, MeasuredCamera, write_camera};
+use crate::linear::Exposure;
+use crate::linear::preview;
 use crate::machine::Pool;
 use crate::photometry::{Method, Outcome};
-use crate::raw::preview;
 use crate::session::Session;
 use crate::solution::{
     InputFolders, OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, REPORT_SCHEMA, Report,

@@ -1,7 +1,8 @@
 //! Everything a solve needs, decoded and checked, in memory.
 
-use crate::instrument::{CalibratedLight, Color, Defects};
-use crate::raw::{Frame, Layout};
+use crate::instrument::{Color, Defects};
+use crate::linear::{Exposure, PhotographedLight, Photographs};
+use crate::raw::Layout;
 use std::path::PathBuf;
 use weavelight_calibration::description::{Camera, Image, Plane};
 
@@ -41,45 +42,26 @@ pub struct Origin {
     pub calibration: PathBuf,
 }
 
-/// A light and its frames.
-#[derive(Clone, Debug)]
-pub struct PhotographedLight {
-    /// Its number in the rig, from 0.
-    pub index: usize,
-    /// What the calibration says of it.
-    pub calibrated: CalibratedLight,
-    /// At least one; by ascending exposure, then by content, so that nothing depends on the order of the files.
-    pub exposures: Vec<Exposure>,
-}
-
-/// One frame and how it was exposed.
-#[derive(Clone, Debug)]
-pub struct Exposure {
-    /// The picture.
-    pub frame: Frame,
-    /// Exposure time, seconds.
-    pub exposure_s: f64,
-    /// Sensitivity.
-    pub iso: f64,
-    /// Where it came from, for messages.
-    pub path: PathBuf,
-}
-
 impl Scene {
     /// Every frame of a light and every ambient frame.
     pub fn exposures(&self) -> impl Iterator<Item = &Exposure> {
         self.lights.iter().flat_map(|light| &light.exposures).chain(&self.ambient)
     }
 
+    /// Its frames, with what is known of lights and sensor.
+    pub(crate) fn photographs(&self) -> Photographs<'_> {
+        Photographs {
+            layout: self.layout,
+            size_px: self.size_px(),
+            lights: &self.lights,
+            ambient: &self.ambient,
+            color: &self.color,
+            defects: &self.defects,
+        }
+    }
+
     /// Width and height.
     pub(crate) fn size_px(&self) -> (usize, usize) {
         (self.width, self.height)
-    }
-}
-
-impl Exposure {
-    /// Seconds at ISO 100 that give the same signal.
-    pub fn seconds_at_iso_100(&self) -> f64 {
-        self.exposure_s * self.iso / 100.0
     }
 }

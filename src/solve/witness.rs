@@ -3,9 +3,8 @@
 
 use super::check::in_words;
 use super::field::LightField;
-use super::scene::{PhotographedLight, Scene};
-use super::sensor::{GREY, intensity_of_places};
-use super::signal::{Normalizer, SignalRows};
+use super::scene::Scene;
+use crate::linear::{GREY, Normalizer, PhotographedLight, SignalRows, intensity_of_places};
 use crate::raw::Layout;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use weavelight_calibration::gain::gain_at;
@@ -106,7 +105,7 @@ pub(crate) fn question(scene: &Scene, field: &LightField) -> Verdict {
 fn witnesses(scene: &Scene, field: &LightField) -> Vec<Witness> {
     let equal: Vec<Vec<f64>> =
         scene.lights.iter().map(|light| vec![1.0; light.exposures.len()]).collect();
-    let normalizer = Normalizer::new(scene, &equal);
+    let normalizer = Normalizer::new(&scene.photographs(), &equal);
     let mut rows = SignalRows::default();
     let mut found = vec![];
     for y in lattice(scene.height) {

@@ -5,14 +5,15 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use weavelight::files::sha256_of_file;
 use weavelight::instrument::{MeasuredCamera, write_camera, write_color, write_lights};
+use weavelight::linear::Exposure;
 use weavelight::photometry::Method;
 use weavelight::raster::{PngContent, write_png_grey16};
 use weavelight::raw::{Layout, Samples};
 use weavelight::report::page_of_solve;
 use weavelight::session::{FrameEntry, Kind, Session};
 use weavelight::solve::{
-    Exposure, Options, Outputs, Reuse, Scale, Scene, find_swatch, leave_out_what_adds_nothing,
-    progressively, run_with_page, solve_scene,
+    Options, Outputs, Reuse, Scale, Scene, find_swatch, leave_out_what_adds_nothing, progressively,
+    run_with_page, solve_scene,
 };
 use weavelight_calibration::description::Image;
 

@@ -22,12 +22,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use weavelight::gpu::Gpu;
 use weavelight::instrument::{CalibratedLight, Color, Noise};
+use weavelight::linear::{Exposure, PhotographedLight};
 use weavelight::photometry::{Method, Outcome};
 use weavelight::raw::{Frame, Layout, Metadata, Samples};
 use weavelight::solve::preview::{Accumulator, Scale};
-use weavelight::solve::{
-    Device, Exposure, Origin, PhotographedLight, Scene, solve_scene, solve_scene_on,
-};
+use weavelight::solve::{Device, Origin, Scene, solve_scene, solve_scene_on};
 use weavelight_calibration::description::{Camera, Cfa, Image, Light, Plane, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;
 use weavelight_calibration::projection::Projector;

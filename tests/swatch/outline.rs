@@ -2,10 +2,11 @@
 
 use crate::photograph::{Field, Scan};
 use crate::thorough;
+use weavelight::linear::Exposure;
 use weavelight::raster::read_exr;
 use weavelight::raw::Samples;
 use weavelight::simulate::Material;
-use weavelight::solve::{Exposure, Scene, Swatch, find_swatch};
+use weavelight::solve::{Scene, Swatch, find_swatch};
 use weavelight_calibration::description::Image;
 use weavelight_sim::cloth::{Preset, Structure};
 

@@ -3,6 +3,7 @@
 use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{add_noise, solve};
+use crate::linear::Exposure;
 use crate::photometry::Method;
 use crate::raw::Samples;
 

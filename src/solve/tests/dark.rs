@@ -3,6 +3,7 @@
 use super::super::*;
 use super::scenes::{Dice, Recipe, scene};
 use super::{add_noise, solve};
+use crate::linear::{Exposure, PhotographedLight};
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
 use weavelight_calibration::description::Cfa;

@@ -5,6 +5,7 @@ use super::super::*;
 use super::scenes::{Recipe, scene};
 use crate::files::Provenance;
 use crate::instrument::{MeasuredCamera, write_camera, write_color, write_lights};
+use crate::linear::Exposure;
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
 use crate::session::{FrameEntry, Kind, Session};

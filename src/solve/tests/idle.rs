@@ -3,6 +3,7 @@
 use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{SAME_NORMAL_DEG, angle_deg, solve};
+use crate::linear::Exposure;
 use crate::photometry::Method;
 use crate::raw::Samples;
 use nalgebra::Vector3;

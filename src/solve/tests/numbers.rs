@@ -3,6 +3,7 @@
 use super::super::finish::{finish, leave_out_what_is_not_finite};
 use super::super::*;
 use super::scenes::{Recipe, scene};
+use crate::linear::PhotographedLight;
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
 use nalgebra::Matrix3;

@@ -1,11 +1,11 @@
 //! Previews of a finished capture session: what they are means of, and that the last of them is the solution itself.
 
 use super::super::preview::{Accumulator, Scale};
-use super::super::sensor::Reading;
 use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{angle_deg, check_scene_against_reference, solve};
 use crate::instrument::{Calibration, CalibrationProvenance, Defects};
+use crate::linear::Reading;
 use crate::photometry::Method;
 use crate::raw::{Frame, Layout, Samples};
 use nalgebra::Vector3;
@@ -38,7 +38,7 @@ fn mean(
                 _ => (channel, channel),
             };
             if own == channel && !defective && !outside {
-                sum += reading.exact(x, y, plane);
+                sum += reading.at(x, y, plane);
                 count += 1.0;
             }
         }

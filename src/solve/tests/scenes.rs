@@ -1,7 +1,8 @@
 //! Small scenes with everything in them that a real one has, generated from a seed.
 
-use super::super::{Exposure, Origin, PhotographedLight, Scene};
+use super::super::{Origin, Scene};
 use crate::instrument::{CalibratedLight, Color, Noise};
+use crate::linear::{Exposure, PhotographedLight};
 use crate::raw::{Frame, Layout, Metadata, Samples};
 use nalgebra::{Point3, Rotation3, UnitVector3, Vector3};
 use weavelight_calibration::description::{

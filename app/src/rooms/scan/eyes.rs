@@ -13,10 +13,10 @@ use std::thread::JoinHandle;
 use weavelight::device::camera::Settings;
 use weavelight::files::{InputKind, read_input};
 use weavelight::instrument::Calibration;
+use weavelight::linear::Exposure;
 use weavelight::machine::spawn;
 use weavelight::raw::{Frame, Hint, decode};
 use weavelight::session::Session;
-use weavelight::solve::Exposure;
 use weavelight::solve::preview::{Accumulator, Scale};
 use weavelight_calibration::description::{Camera, Plane};
 

@@ -2,7 +2,8 @@
 
 use eframe::egui::{Color32, ColorImage};
 use weavelight::instrument::Calibration;
-use weavelight::raw::{self, Frame};
+use weavelight::linear::preview;
+use weavelight::raw::Frame;
 use weavelight_calibration::description::Image;
 
 /// A frame of the strip.
@@ -25,7 +26,7 @@ const CLIPPED_COLOR: Color32 = Color32::from_rgb(255, 0, 255);
 
 /// A frame made small.
 pub fn thumb(frame: &Frame, light: Option<usize>, calibration: Option<&Calibration>) -> ColorImage {
-    let small = raw::preview(frame, THUMB);
+    let small = preview(frame, THUMB);
     let balance = light
         .and_then(|light| calibration?.lights.get(light))
         .map_or_else(|| grey_world(&small), |light| balance(light.light.intensity()));
@@ -34,7 +35,7 @@ pub fn thumb(frame: &Frame, light: Option<usize>, calibration: Option<&Calibrati
 
 /// A test shot, `longest_side` pixels at most; with what clips marked, if `mark_clipped`.
 pub fn test_shot(frame: &Frame, longest_side: usize, mark_clipped: bool) -> ColorImage {
-    let small = raw::preview(frame, longest_side);
+    let small = preview(frame, longest_side);
     let mut shown = picture(&small, grey_world(&small));
     if mark_clipped {
         let clipped = |rgb: &[f32; 3]| rgb.iter().any(|value| *value >= CLIPPED);

@@ -1,7 +1,7 @@
 //! What the sensor's noise becomes in the units that the kernels fit: variance of the normalised signal.
 
-use super::scene::{Exposure, Scene};
-use super::sensor::{GREY, Reading, intensity_of_places};
+use super::exposure::{Exposure, PhotographedLight, Photographs};
+use super::reading::{GREY, Reading, intensity_of_places};
 use crate::instrument::Noise;
 use crate::photometry::VarianceModel;
 use crate::raw::Layout;
@@ -66,7 +66,7 @@ impl AmbientNoise {
 }
 
 /// Variance of the normalised signal of one exposure of a light with intensity `intensity`, ambient light subtracted.
-pub(crate) fn exposure_variance(
+fn exposure_variance(
     noise: LinearNoise,
     ambient: AmbientNoise,
     exposure: &Exposure,
@@ -86,7 +86,7 @@ pub(crate) fn exposure_variance(
 }
 
 /// Variance of a weighted mean of independent exposures. What the light model leaves over (kappa) is the same in all.
-pub(crate) fn merged_variance(parts: &[(f64, VarianceModel)]) -> VarianceModel {
+fn merged_variance(parts: &[(f64, VarianceModel)]) -> VarianceModel {
     let total: f64 = parts.iter().map(|(weight, _)| weight).sum();
     let mean = |part: fn(&VarianceModel) -> f32| {
         let sum: f64 =
@@ -100,24 +100,43 @@ pub(crate) fn merged_variance(parts: &[(f64, VarianceModel)]) -> VarianceModel {
     }
 }
 
+/// Variance at even and odd columns of a row, of the mean of those exposures whose bit is set.
+pub(crate) fn variance_of_row(
+    exposures: &[[VarianceModel; 4]],
+    weights: &[f64],
+    row_parity: usize,
+    used: u64,
+) -> [VarianceModel; 2] {
+    [0, 1].map(|column| {
+        let parts: Vec<(f64, VarianceModel)> = exposures
+            .iter()
+            .zip(weights)
+            .enumerate()
+            .filter(|(bit, _)| used >> (*bit).min(63) & 1 == 1)
+            .map(|(_, (places, &weight))| (weight, places[row_parity * 2 + column]))
+            .collect();
+        merged_variance(&parts)
+    })
+}
+
 /// Variance of every exposure of every light, per place of the 2 x 2 cell.
 pub(crate) fn exposure_variances(
-    scene: &Scene,
+    of: &Photographs,
     noise: LinearNoise,
     ambient: AmbientNoise,
 ) -> Vec<Vec<[VarianceModel; 4]>> {
-    let of_exposure = |exposure: &Exposure, intensity: [f64; 3]| match scene.layout {
+    let of_exposure = |exposure: &Exposure, intensity: [f64; 3]| match of.layout {
         Layout::Rgb => {
             [grey_variance(intensity.map(|i| exposure_variance(noise, ambient, exposure, i))); 4]
         }
         layout => intensity_of_places(layout, 0, intensity)
             .map(|i| exposure_variance(noise, ambient, exposure, i)),
     };
-    let of_light = |light: &super::scene::PhotographedLight| {
+    let of_light = |light: &PhotographedLight| {
         let intensity = light.calibrated.light.intensity();
         light.exposures.iter().map(|exposure| of_exposure(exposure, intensity)).collect()
     };
-    scene.lights.iter().map(of_light).collect()
+    of.lights.iter().map(of_light).collect()
 }
 
 /// Variance of the grey value of a colour pixel, for a grey surface.
@@ -128,13 +147,13 @@ fn grey_variance(channels: [VarianceModel; 3]) -> VarianceModel {
     VarianceModel { shot: sum(|v| v.shot), floor: sum(|v| v.floor), kappa: channels[1].kappa }
 }
 
-/// Full scale of the scene's sensor in raw numbers: the mean over the 2 x 2 cell, and the largest of all frames.
-pub(crate) fn full_scale(scene: &Scene) -> f64 {
+/// Full scale of the sensor in raw numbers: the mean over the 2 x 2 cell, and the largest of all frames.
+pub(crate) fn full_scale(of: &Photographs) -> f64 {
     let of_frame = |exposure: &Exposure| {
-        let range = Reading::new(&exposure.frame, &scene.color).range();
+        let range = Reading::new(&exposure.frame, &of.color).range();
         range.iter().map(|&range| f64::from(range)).sum::<f64>() / 4.0
     };
-    let lit = scene.lights.iter().flat_map(|light| &light.exposures);
+    let lit = of.lights.iter().flat_map(|light| &light.exposures);
     let largest = lit.map(of_frame).fold(0.0, f64::max);
     if largest > 0.0 { largest } else { 1.0 }
 }

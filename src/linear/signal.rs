@@ -2,15 +2,15 @@
 //! light removed, exposures of the same light merged. Made right before the kernel reads them, so that no frame is ever
 //! copied as floating point.
 
+use super::exposure::{Exposure, Photographs};
 use super::gain::GainRows;
-use super::scene::{Exposure, Scene};
-use super::sensor::{GREY, Reading, intensity_of_places};
+use super::reading::{GREY, Reading, intensity_of_places};
 use crate::instrument::Defects;
 use crate::raw::Layout;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How every row of a scene is normalised.
+/// How every row of the frames is normalised.
 pub(crate) struct Normalizer<'a> {
     layout: Layout,
     channels: usize,
@@ -57,27 +57,27 @@ pub(crate) struct SignalRows {
 
 impl<'a> Normalizer<'a> {
     /// `weights`: per light and exposure, the share in the mean.
-    pub(crate) fn new(scene: &'a Scene, weights: &[Vec<f64>]) -> Self {
-        let channels = scene.layout.channels();
-        let frame_px = (scene.width, scene.height);
-        let lights = scene.lights.iter().zip(weights).map(|(light, weights)| {
+    pub(crate) fn new(of: &Photographs<'a>, weights: &[Vec<f64>]) -> Self {
+        let channels = of.layout.channels();
+        let frame_px = of.size_px;
+        let lights = of.lights.iter().zip(weights).map(|(light, weights)| {
             let intensity = light.calibrated.light.intensity();
-            let places = |channel| intensity_of_places(scene.layout, channel, intensity);
+            let places = |channel| intensity_of_places(of.layout, channel, intensity);
             let exposures = light.exposures.iter().zip(weights);
             LightPlan {
                 exposures: exposures
-                    .map(|(e, &weight)| exposure_plan(scene, e, &places, weight))
+                    .map(|(e, &weight)| exposure_plan(of, e, &places, weight))
                     .collect(),
                 per_intensity: (0..channels).map(|c| places(c).map(|i| (1.0 / i) as f32)).collect(),
                 gain: light.calibrated.gain_map.as_ref().map(|map| GainRows::new(map, frame_px)),
             }
         });
         Self {
-            layout: scene.layout,
+            layout: of.layout,
             channels,
             lights: lights.collect(),
-            ambient: ambient_plan(scene),
-            defects: &scene.defects,
+            ambient: ambient_plan(of),
+            defects: of.defects,
             frame_px,
         }
     }
@@ -252,7 +252,7 @@ impl<'a> Normalizer<'a> {
 }
 
 fn exposure_plan<'a>(
-    scene: &Scene,
+    of: &Photographs,
     exposure: &'a Exposure,
     places: &impl Fn(usize) -> [f64; 4],
     weight: f64,
@@ -260,20 +260,16 @@ fn exposure_plan<'a>(
     let seconds = exposure.seconds_at_iso_100();
     let factor = |channel| places(channel).map(|intensity| (1.0 / (seconds * intensity)) as f32);
     ExposurePlan {
-        reading: Reading::new(&exposure.frame, &scene.color),
-        factor: (0..scene.layout.channels()).map(factor).collect(),
+        reading: Reading::new(&exposure.frame, of.color),
+        factor: (0..of.layout.channels()).map(factor).collect(),
         weight: weight as f32,
     }
 }
 
-fn ambient_plan(scene: &Scene) -> Vec<(Reading<'_>, [f32; 4])> {
-    let seconds: f64 = scene.ambient.iter().map(Exposure::seconds_at_iso_100).sum();
+fn ambient_plan<'a>(of: &Photographs<'a>) -> Vec<(Reading<'a>, [f32; 4])> {
+    let seconds: f64 = of.ambient.iter().map(Exposure::seconds_at_iso_100).sum();
     let factor = [(1.0 / seconds) as f32; 4];
-    scene
-        .ambient
-        .iter()
-        .map(|exposure| (Reading::new(&exposure.frame, &scene.color), factor))
-        .collect()
+    of.ambient.iter().map(|exposure| (Reading::new(&exposure.frame, of.color), factor)).collect()
 }
 
 impl SignalRows {

@@ -1,4 +1,6 @@
-use super::{Frame, Layout, Samples};
+use super::reading::Reading;
+use crate::instrument::Color;
+use crate::raw::{Frame, Layout};
 use weavelight_calibration::description::Image;
 
 /// Cells of 2 x 2 looked at per side of a pixel of the preview: enough to calm noise, few enough that a frame takes
@@ -7,6 +9,7 @@ const CELLS_PER_SIDE: usize = 4;
 
 /// A frame made small, to be looked at: linear R, G, B as fractions of the range from black to saturation.
 pub fn preview(frame: &Frame, longest_side: usize) -> Image<[f32; 3]> {
+    let reading = Reading::new(frame, &Color::default());
     let cells = (frame.width.div_ceil(2), frame.height.div_ceil(2));
     let factor = cells.0.max(cells.1).div_ceil(longest_side.max(1)).max(1);
     let (width, height) = (cells.0.div_ceil(factor), cells.1.div_ceil(factor));
@@ -18,7 +21,7 @@ pub fn preview(frame: &Frame, longest_side: usize) -> Image<[f32; 3]> {
             let columns = (x * factor..((x + 1) * factor).min(cells.0)).step_by(step);
             let mut mean = Mean::default();
             rows.for_each(|row| {
-                columns.clone().for_each(|column| mean.add_cell(frame, column, row));
+                columns.clone().for_each(|column| mean.add_cell(&reading, column, row));
             });
             data.push(mean.color());
         }
@@ -34,30 +37,21 @@ struct Mean {
 
 impl Mean {
     /// The four pixels of a cell (fewer at the edge of a frame of odd size).
-    fn add_cell(&mut self, frame: &Frame, column: usize, row: usize) {
+    fn add_cell(&mut self, reading: &Reading, column: usize, row: usize) {
+        let frame = reading.frame();
         for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
             let (x, y) = (column * 2 + dx, row * 2 + dy);
             if x < frame.width && y < frame.height {
-                self.add_pixel(frame, x, y);
+                self.add_pixel(reading, x, y);
             }
         }
     }
 
-    fn add_pixel(&mut self, frame: &Frame, x: usize, y: usize) {
-        let place = (y & 1) * 2 + (x & 1);
-        let (black, saturation) = (frame.black[place], frame.saturation[place]);
-        let range = if saturation.is_finite() { saturation - black } else { 1.0 };
-        let pixel = y * frame.width + x;
-        match frame.layout {
-            Layout::Mosaic(cfa) => {
-                self.add(cfa.channel(x, y) as usize, (sample(frame, pixel) - black) / range);
-            }
-            Layout::Grey => {
-                (0..3).for_each(|c| self.add(c, (sample(frame, pixel) - black) / range));
-            }
-            Layout::Rgb => {
-                (0..3).for_each(|c| self.add(c, (sample(frame, 3 * pixel + c) - black) / range));
-            }
+    fn add_pixel(&mut self, reading: &Reading, x: usize, y: usize) {
+        match reading.frame().layout {
+            Layout::Mosaic(cfa) => self.add(cfa.channel(x, y) as usize, reading.share(x, y, 0)),
+            Layout::Grey => (0..3).for_each(|c| self.add(c, reading.share(x, y, 0))),
+            Layout::Rgb => (0..3).for_each(|c| self.add(c, reading.share(x, y, c))),
         }
     }
 
@@ -73,17 +67,10 @@ impl Mean {
     }
 }
 
-fn sample(frame: &Frame, index: usize) -> f32 {
-    match &frame.samples {
-        Samples::U16(samples) => f32::from(samples[index]),
-        Samples::F32(samples) => samples[index],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raw::Metadata;
+    use crate::raw::{Metadata, Samples};
     use weavelight_calibration::description::Cfa;
 
     fn frame(width: usize, height: usize, layout: Layout, samples: Vec<u16>) -> Frame {

@@ -1,14 +1,17 @@
 //! From raw numbers to linear light, one row of one frame at a time: black level, range, saturation, response.
 
+use super::levels::{Levels, raw_at};
 use crate::instrument::Color;
 use crate::photometry::{Normalisation, normalise_row};
 use crate::raw::{Frame, Layout, Samples};
 use std::ops::Range;
 
-/// How the raw numbers of one frame are read.
+/// How the raw numbers of one frame are read, row by row in float32.
 pub(crate) struct Reading<'a> {
     frame: &'a Frame,
     channels: usize,
+    /// In the precision of the rows.
+    levels: Levels,
     /// Per place of the 2 x 2 cell.
     black: [f32; 4],
     /// From here on a sample is clipped.
@@ -19,20 +22,28 @@ pub(crate) struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// The calibration's levels override the file's. A format without a ceiling counts 1.0 as full scale.
+    /// By [`Levels::of`] the frame.
     pub(crate) fn new(frame: &'a Frame, color: &Color) -> Self {
-        let black =
-            color.black_level.map_or(frame.black, |levels| levels.map(|level| level as f32));
-        let saturation = color.saturation_level.map_or(frame.saturation, |level| [level as f32; 4]);
-        let range = [0, 1, 2, 3].map(|place| match saturation[place] - black[place] {
-            range if range.is_finite() => range,
-            _ => 1.0,
-        });
-        let clip_level = color.clip_level.map_or(f32::INFINITY, |level| level as f32);
-        let saturation = saturation.map(|level| level.min(clip_level));
-        let is_linear = matches!(color.response.as_slice(), [] | [0.0, 1.0]);
-        let response = (!is_linear).then(|| color.response.iter().map(|&c| c as f32).collect());
-        Self { frame, channels: frame.layout.channels(), black, saturation, range, response }
+        let levels = Levels::of(frame, color).in_single_precision();
+        let of_places = |level: fn(&Levels, usize) -> f64| {
+            [0, 1, 2, 3].map(|place| level(&levels, place) as f32)
+        };
+        let (saturation, range) = (of_places(Levels::saturated_from), of_places(Levels::range));
+        let response = levels.response().iter().map(|&c| c as f32).collect::<Vec<_>>();
+        Self {
+            frame,
+            channels: frame.layout.channels(),
+            black: levels.black.map(|level| level as f32),
+            saturation,
+            range,
+            response: (!response.is_empty()).then_some(response),
+            levels,
+        }
+    }
+
+    /// The frame.
+    pub(crate) fn frame(&self) -> &'a Frame {
+        self.frame
     }
 
     /// Raw numbers from black to saturation, per place of the 2 x 2 cell.
@@ -47,21 +58,16 @@ impl<'a> Reading<'a> {
 
     /// Linear light of one sample in float64 (fraction of full scale); NaN where it is saturated or not finite. The plain
     /// definition of [`Reading::row`].
-    pub(crate) fn exact(&self, x: usize, y: usize, channel: usize) -> f64 {
+    pub(crate) fn at(&self, x: usize, y: usize, channel: usize) -> f64 {
         let place = (y & 1) * 2 + (x & 1);
-        let at = (y * self.frame.width + x) * self.channels + channel;
-        let raw = match &self.frame.samples {
-            Samples::U16(samples) => f64::from(samples[at]),
-            Samples::F32(samples) => f64::from(samples[at]),
-        };
-        if !raw.is_finite() || raw >= f64::from(self.saturation[place]) {
-            return f64::NAN;
-        }
-        let fraction = (raw - f64::from(self.black[place])) / f64::from(self.range[place]);
-        match &self.response {
-            None => fraction,
-            Some(c) => c.iter().rev().fold(0.0, |sum, &c| sum * fraction + f64::from(c)),
-        }
+        self.levels.linear(raw_at(self.frame, x, y, channel), place).unwrap_or(f64::NAN)
+    }
+
+    /// Where a sample lies between black (0) and the end of the range (1), saturated or not and before the response curve:
+    /// for pictures and histograms of what the camera wrote.
+    pub(crate) fn share(&self, x: usize, y: usize, channel: usize) -> f32 {
+        let place = (y & 1) * 2 + (x & 1);
+        (raw_at(self.frame, x, y, channel) as f32 - self.black[place]) / self.range[place]
     }
 
     /// Linear light times `factor`, for one channel of the given columns of row `y`; NaN where the sample is saturated or
@@ -222,7 +228,7 @@ mod tests {
         let mut row = [0.0; 4];
         reading.row(0, 0, 0..4, [65_535.0; 4], &mut row);
         assert_eq!(&row[..2], [100.0, 4094.0]);
-        assert!(row[2].is_nan() && row[3].is_nan() && reading.exact(2, 0, 0).is_nan());
+        assert!(row[2].is_nan() && row[3].is_nan() && reading.at(2, 0, 0).is_nan());
         assert_eq!(reading.range(), [65_535.0; 4]);
         let mut saturated = [false; 4];
         reading.mark_saturated(0, 0..4, &mut saturated);
