@@ -9,10 +9,10 @@
 //! - [`raster`]: float and integer pictures (EXR, PNG, TIFF, JPEG) in and out
 //! - [`raw`]: a frame as the sensor wrote it; [`linear`]: its raw numbers as linear light
 //! - [`session`]: the capture-session folder; [`instrument`]: `rig.toml` and the calibration folder;
-//!   [`solution`]: the folder that a solve writes
+//!   [`solution`]: the folder that a solve writes; [`settings`]: how solves are set
 //! - [`albedo`]: the colours of a solved mosaic
-//! - [`photometry`]: the kernels, on one band of rows; [`gpu`]: their first step on a graphics processor; [`solve`]: the run
-//!   around them
+//! - [`photometry`]: the kernels, on one band of rows; [`gpu`]: their first step on a graphics processor; [`swatch`]: where
+//!   the cloth is; [`solve`]: the run around them; [`live`]: maps while a scan runs
 //! - [`simulate`]: the simulated rig's folders
 //! - [`device`]: the light board, and what else the capture needs of the world
 //! - [`report`]: what a command tells; [`mod@bench`]: run time against error
@@ -29,6 +29,7 @@ pub mod files;
 pub mod gpu;
 pub mod instrument;
 pub mod linear;
+pub mod live;
 pub mod machine;
 pub mod photometry;
 pub mod quantity;
@@ -36,6 +37,8 @@ pub mod raster;
 pub mod raw;
 pub mod report;
 pub mod session;
+pub mod settings;
 pub mod simulate;
 pub mod solution;
 pub mod solve;
+pub mod swatch;

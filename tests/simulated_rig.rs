@@ -30,7 +30,7 @@ fn errors(folder: &Path, change: impl Fn(&mut simulate::Options)) -> (Figures, F
     let mut wanted =
         solve::Options::new(options.out.join("swatch"), options.out.join("calibration"), &out);
     wanted.method = Method::LeastSquares;
-    solve::run(&wanted, &|_| {}).unwrap();
+    solve::run(&wanted, &|_| {}, None).unwrap();
     let compare = |name: &str, kind| {
         let (a, b) = (out.join(name), options.out.join("truth").join(name));
         compare::run(&compare::Options { a, b, mask: None, kind: Some(kind) }).unwrap().figures

@@ -19,11 +19,13 @@
 use nalgebra::Vector3;
 use std::path::Path;
 use weavelight::compare::{NormalFigures, compare_normals};
+use weavelight::gpu::Device;
 use weavelight::linear::{Exposure, PhotographedLight};
+use weavelight::photometry::Maps;
 use weavelight::photometry::Method;
 use weavelight::raw::{Frame, Layout, Samples, demosaic};
 use weavelight::simulate::{self, Instrument, Part};
-use weavelight::solve::{Maps, Scene, load_scene, solve_scene};
+use weavelight::solve::Scene;
 use weavelight_calibration::description::{Cfa, Image};
 use weavelight_sim::cloth::{Preset, Relief, Structure};
 use weavelight_sim::render::{Shot, auto_exposure, shoot_with_truth};
@@ -51,7 +53,7 @@ fn photograph(structure: Structure, yarn_px: f64, exposure: f64) -> Photographed
     };
     simulate::run(&options, &|_, _| {}).unwrap();
     let calibration = options.out.join("calibration");
-    let (mut scene, _) = load_scene(&options.out.join("swatch"), &calibration).unwrap();
+    let (mut scene, _) = Scene::load(&options.out.join("swatch"), &calibration).unwrap();
     let instrument = Instrument::from_options(&options).unwrap();
     let fabric = fabric(&options, structure, yarn_px);
     let (stage, lights) = (&instrument.stage, scene.lights.len());
@@ -98,7 +100,7 @@ fn fabric(
 }
 
 fn solve(scene: &Scene) -> Maps {
-    solve_scene(scene, Method::Auto, &|_| {}).unwrap().0
+    scene.check().unwrap().solve(Method::Auto, &Device::Cpu, None, &|_| {}).unwrap().maps
 }
 
 /// Errors where both methods of a comparison have a normal and a truth.

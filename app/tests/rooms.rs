@@ -319,13 +319,14 @@ fn the_window_solves_as_the_command_line_does() {
     let rig = window.rig();
     // As `weavelight solve --settings FILE` makes them.
     window.harness.state().desk().settings.save().unwrap();
-    let settings = weavelight::solve::Settings::read(&window.home().join("settings.toml")).unwrap();
+    let settings =
+        weavelight::settings::Settings::read(&window.home().join("settings.toml")).unwrap();
     let options = settings.options(
         &rig.join("scans/linen 1"),
         &rig.join("calibration"),
         &rig.join("by-command"),
     );
-    weavelight::solve::run(&options, &|_| ()).unwrap();
+    weavelight::solve::run(&options, &|_| (), None).unwrap();
     for file in [
         "normal.exr",
         "albedo.exr",

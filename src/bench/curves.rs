@@ -4,7 +4,7 @@ use super::Effort;
 use super::band::{Band, Output, WIDTH, solve, touch};
 use super::clock::{Spent, timed};
 use crate::photometry::Method;
-use crate::solve::method_name;
+
 use serde::Serialize;
 
 const MEGAPIXELS: [f64; 5] = [1.0, 4.0, 16.0, 50.0, 100.0];
@@ -73,7 +73,7 @@ pub(super) fn measure(effort: Effort) -> Vec<Curve> {
 }
 
 fn curves(over: &'static str, plans: impl Iterator<Item = Plan>) -> Vec<Curve> {
-    let names = std::iter::once("touch").chain(METHODS.map(method_name));
+    let names = std::iter::once("touch").chain(METHODS.map(Method::name));
     let mut curves: Vec<Curve> =
         names.map(|method| Curve { over, method, points: Vec::new() }).collect();
     for plan in plans {

@@ -4,7 +4,6 @@ use super::chart::{Line, Mark, Panel, Shape, svg as svg_of_panels};
 use super::curves::{Curve, CurvePoint};
 use super::report::{MethodReport, Report, SetReport};
 use crate::photometry::Method;
-use crate::solve::method_name;
 
 /// The program's own methods, others, the front (told apart by colour-blind people too).
 const OWN: &str = "#0060a8";
@@ -41,7 +40,7 @@ fn of_set(set: &SetReport) -> Panel {
 
 fn is_own(name: &str) -> bool {
     let own = [Method::LeastSquares, Method::Weighted, Method::Auto, Method::Robust];
-    name == "gpu" || own.into_iter().any(|method| method_name(method) == name)
+    name == "gpu" || own.into_iter().any(|method| method.name() == name)
 }
 
 /// The front's points by ascending time.

@@ -5,7 +5,7 @@ use crate::compare::read_map;
 use crate::files::FileError;
 use crate::simulate::{self, Instrument, Material, Part, SimulateError};
 use crate::solution::NORMAL_EXR;
-use crate::solve::{Scene, load_scene};
+use crate::solve::Scene;
 use std::path::{Path, PathBuf};
 use weavelight_calibration::description::Image;
 use weavelight_sim::cloth::{Preset, Structure};
@@ -136,7 +136,7 @@ fn write_rig(path: &Path, [width, height]: [usize; 2]) -> Result<(), SimulateErr
 
 impl SetFolders {
     pub(crate) fn load(&self) -> Result<Set, BenchError> {
-        let (scene, warnings) = load_scene(&self.session, &self.calibration)?;
+        let (scene, warnings) = Scene::load(&self.session, &self.calibration)?;
         let mut truth = read_map(&self.truth)?;
         let frames = [scene.width, scene.height];
         if [truth.width, truth.height] != frames {

@@ -3,7 +3,8 @@
 use super::output::{Failure, Output};
 use super::progress::Progress;
 use crate::files::path_text;
-use crate::solve::{self, MaskOptions, Reuse};
+use crate::solution::Reuse;
+use crate::solve::{self, MaskOptions};
 use serde_json::json;
 use std::path::PathBuf;
 

@@ -5,10 +5,11 @@ use super::progress::Progress;
 use crate::files::FileError;
 use crate::photometry::Method;
 use crate::report::page_of_solve;
+use crate::settings::Settings;
+use crate::solution::{AlbedoKind, Outputs, Residuals, Reuse, Scale};
 use crate::solution::{REPORT_HTML, Report};
-use crate::solve::{
-    self, AlbedoKind, MaskChoice, Options, Outputs, Residuals, Reuse, Scale, Settings, Shown,
-};
+use crate::solve::{self, Options, Shown};
+use crate::swatch::MaskChoice;
 use clap::ValueEnum;
 use std::path::PathBuf;
 
@@ -90,7 +91,7 @@ enum DeviceName {
     Gpu,
 }
 
-impl From<DeviceName> for solve::DeviceName {
+impl From<DeviceName> for crate::settings::DeviceName {
     fn from(name: DeviceName) -> Self {
         match name {
             DeviceName::Auto => Self::Auto,
@@ -145,7 +146,7 @@ impl From<MethodName> for Method {
     }
 }
 
-impl From<MethodName> for solve::MethodName {
+impl From<MethodName> for crate::settings::MethodName {
     fn from(name: MethodName) -> Self {
         match name {
             MethodName::Auto => Self::Auto,
@@ -155,7 +156,7 @@ impl From<MethodName> for solve::MethodName {
     }
 }
 
-impl From<NormalYName> for solve::NormalYName {
+impl From<NormalYName> for crate::settings::NormalYName {
     fn from(name: NormalYName) -> Self {
         match name {
             NormalYName::Up => Self::Up,
@@ -168,8 +169,11 @@ impl Args {
     /// Those of the file, with what the command line says over them.
     fn settings(&self) -> Result<Settings, FileError> {
         let kept = self.settings.as_deref().map(Settings::read).transpose()?.unwrap_or_default();
-        let usual =
-            if self.preview.is_some() { solve::MethodName::LeastSquares } else { kept.method };
+        let usual = if self.preview.is_some() {
+            crate::settings::MethodName::LeastSquares
+        } else {
+            kept.method
+        };
         Ok(Settings {
             method: self.method.map_or(usual, Into::into),
             undistort: self.undistort || kept.undistort,
@@ -216,8 +220,8 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let progress = Progress::new();
     let tell = |state: solve::Progress| progress.set(state.share(), state.stage.what());
     let page = |shown: &Shown| page_of_solve(shown, None);
-    let page: Option<solve::Page> = args.wants(Wanted::Page).then_some(&page);
-    let solved = solve::run_with_page(&options, &tell, page).map_err(Failure::work)?;
+    let page = args.wants(Wanted::Page).then_some(&page as &(dyn Fn(&Shown) -> String + Sync));
+    let solved = solve::run(&options, &tell, page).map_err(Failure::work)?;
     drop(progress);
     let report = solved.report;
     let up_to_date = if solved.up_to_date { "up to date, " } else { "" };

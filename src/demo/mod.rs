@@ -84,7 +84,7 @@ fn shoot(
     let page = |shown: &Shown| page_of_solve(shown, Some(&truth));
     let solving = solve::Options::new(rig.join("swatch"), rig.join("calibration"), &maps);
     progress(0.75, &format!("solving {}", fabric.name()));
-    let solved = solve::run_with_page(&solving, &|_| (), Some(&page))?;
+    let solved = solve::run(&solving, &|_| (), Some(&page))?;
     let against = |file: &str, kind| figures(&maps.join(file), &truth_folder.join(file), kind);
     let (normal, albedo) = (against(NORMAL_EXR, Kind::Normal)?, against(ALBEDO_EXR, Kind::Color)?);
     progress(1.0, "done");

@@ -9,6 +9,7 @@ mod absent;
 mod adapter;
 #[cfg(feature = "gpu")]
 mod buffers;
+mod choice;
 #[cfg(feature = "gpu")]
 mod device;
 mod error;
@@ -24,7 +25,10 @@ pub use absent::{Flight, Gpu};
 pub use adapter::Adapter;
 #[cfg(feature = "gpu")]
 pub use buffers::Flight;
+pub use choice::Device;
 #[cfg(feature = "gpu")]
 pub use device::Gpu;
 pub use error::GpuError;
+
+pub(crate) use choice::{Measured, Memory};
 pub use tile::{Answer, Tile, TileRow};

@@ -114,6 +114,25 @@ const CHI_SQUARE_999: [f64; 61] = [
     95.7510, 97.0388, 98.3242, 99.6072, 100.8879,
 ];
 
+impl Method {
+    const ALL: [Self; 4] = [Self::Auto, Self::LeastSquares, Self::Weighted, Self::Robust];
+
+    /// As reports and the command line have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::LeastSquares => "least-squares",
+            Method::Weighted => "weighted",
+            Method::Robust => "robust",
+            Method::Auto => "auto",
+        }
+    }
+
+    /// The method of that name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -18,10 +18,12 @@ mod complete;
 mod elsewhere;
 mod least_squares;
 mod light_set;
+mod maps;
 mod method;
 mod noise;
 mod normal_equations;
 mod normalise;
+mod photosite;
 mod pieces;
 mod reference;
 mod reference_robust;
@@ -39,11 +41,13 @@ pub(crate) mod tests;
 
 pub use elsewhere::{CutPiece, CutRow, Found};
 pub use light_set::LightSet;
+pub use maps::{Albedo, Counts, Maps, OUTCOMES, is_solved};
 #[cfg(feature = "gpu")]
 pub(crate) use method::chi_square_limit;
 pub use method::{MAX_LIGHTS, Method};
 pub use noise::{NoiseEvidence, NoiseSample, estimate_noise};
 pub use normalise::{Normalisation, normalise_row};
+pub use photosite::{Part, Photosite, Sample};
 pub use reference::{Fit, Pixel, Samples, reference_row, solve_pixel};
 pub(crate) use reference::{inverse_if_conditioned, variance};
 pub use row::{FieldRow, Outcome, RowError, RowInput, RowOutput, Support, VarianceModel};

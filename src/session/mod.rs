@@ -19,6 +19,9 @@ use weavelight_calibration::description::{Cfa, Plane};
 /// The manifest's name in its folder.
 pub const MANIFEST: &str = "session.toml";
 
+/// The name of its mask, where Weavelight makes one.
+pub const MASK_FILE: &str = "mask.png";
+
 /// A capture session as its `session.toml` describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {

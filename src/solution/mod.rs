@@ -1,7 +1,11 @@
 //! The folder that a solve writes: names of its files, and `report.json`.
 
+mod choices;
+mod maps;
 mod report;
 
+pub use choices::{AlbedoKind, Grid, NormalY, Outputs, Residuals, Reuse, Scale};
+pub use maps::Finished;
 pub use report::{
     AlbedoReport, DeviceReport, InputFolders, PlaneReport, Report, ResidualFile,
     SCHEMA as REPORT_SCHEMA,

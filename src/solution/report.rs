@@ -1,4 +1,5 @@
 use crate::files::{FileError, Input, read_input_text, write_atomic};
+use crate::photometry::Method;
 use crate::quantity::{DIRECTION, MM_PER_PX, Problem, SURFACE_MM, check_side};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -191,6 +192,15 @@ pub struct PlaneReport {
 }
 
 impl Report {
+    /// How the solution was solved; `None` where the report names a method that this version does not know. Reports without
+    /// the key are of versions that knew one way only.
+    pub fn solved_by(&self) -> Option<Method> {
+        match self.method.as_str() {
+            "" => Some(Method::Auto),
+            name => Method::named(name),
+        }
+    }
+
     /// Reads `report.json`.
     ///
     /// # Errors

@@ -1,12 +1,15 @@
 //! What is up to date is not made again: a solution remembers the hash of everything it was made from.
 
-use super::encode::map_files;
-use super::run::method_name;
-use super::{Device, Grid, MaskChoice, NormalY, Options, Residuals, SolveError};
 use crate::files::{FileError, Input, PROGRAM, sha256_hex, sha256_of_file};
+use crate::gpu::Device;
 use crate::instrument::{CAMERA_FILE, COLOR_FILE, DEFECTS_FILE, LIGHTS_FILE};
 use crate::session::{Session, SessionError};
-use crate::solution::{self, MASK_INPUT, REPORT_JSON, Report, ResidualFile};
+use crate::solution::{
+    self, Grid, MASK_INPUT, NormalY, REPORT_JSON, Report, ResidualFile, Residuals,
+};
+use crate::solve::output::encode::map_files;
+use crate::solve::{Options, SolveError};
+use crate::swatch::MaskChoice;
 use rayon::prelude::*;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -118,7 +121,7 @@ fn file_name(path: &Path) -> String {
 
 /// Everything besides the inputs that changes a map, by names that do not change with the code.
 fn settings(options: &Options) -> String {
-    let method = method_name(options.method);
+    let method = options.method.name();
     let grid = match options.grid {
         Grid::Sensor => "sensor",
         Grid::Undistorted => "undistorted",

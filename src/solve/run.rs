@@ -1,32 +1,30 @@
 //! The whole run, from folders to a folder.
 
-use super::SolveError;
-use super::current::{Inputs, still_current};
-use super::encode::write_maps;
-use super::finish::{
-    Finished, color_space, finish, leave_out_what_is_not_finite, pinhole, undistort,
-};
-use super::in_memory::{
-    SolvedScene, leave_out_what_adds_nothing, solve_scene_on, solve_scene_with_residuals,
-};
-use super::load::{Loaded, load, unverified};
-use super::maps::Counts;
-use super::options::{Grid, MaskChoice, Options, Outputs, Residuals, Reuse};
-use super::preview::Scale;
-use super::progress::{Progress, Stage};
-use super::residual::ResidualFiles;
-use super::scene::Scene;
-use super::swatch::find_swatch;
 use crate::files::{PROGRAM, StagedFolder, write_atomic};
 use crate::instrument::{CAMERA_FILE, Calibration, MeasuredCamera, write_camera};
 use crate::linear::Exposure;
 use crate::linear::preview;
 use crate::machine::Pool;
-use crate::photometry::{Method, Outcome};
+use crate::photometry::Counts;
+use crate::photometry::Outcome;
 use crate::session::Session;
 use crate::solution::{
-    InputFolders, OUTPUT, PlaneReport, REPORT_HTML, REPORT_JSON, REPORT_SCHEMA, Report,
+    Finished, Grid, InputFolders, OUTPUT, Outputs, PlaneReport, REPORT_HTML, REPORT_JSON,
+    REPORT_SCHEMA, Report, Residuals, Reuse, Scale,
 };
+use crate::solve::SolveError;
+use crate::solve::bands::SolvedScene;
+use crate::solve::bands::residual::ResidualFiles;
+use crate::solve::current::{Inputs, still_current};
+use crate::solve::options::Options;
+use crate::solve::output::encode::write_maps;
+use crate::solve::output::finish::{
+    color_space, finish, leave_out_what_is_not_finite, pinhole, undistort,
+};
+use crate::solve::progress::{Progress, Stage};
+use crate::solve::scene::Scene;
+use crate::solve::scene::load::{Loaded, load, unverified};
+use crate::swatch::MaskChoice;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -43,19 +41,23 @@ pub struct Solved {
     pub up_to_date: bool,
 }
 
-/// Solves a capture session and writes the solution's folder; nothing stands under its name before it is whole.
+/// Solves a capture session and writes the solution's folder, with a page beside the maps where `page` writes one; nothing stands under its name before it is whole.
 ///
 /// The same inputs give the same maps, byte for byte, whatever the number of threads and the order of the frames. A graphics
 /// processor rounds otherwise: its normals agree within 0.001 degrees.
 ///
 /// # Errors
 /// [`SolveError`] names the file and the remedy; nothing is left behind then.
-pub fn run(options: &Options, progress: &(dyn Fn(Progress) + Sync)) -> Result<Solved, SolveError> {
-    run_with_page(options, progress, None)
+pub fn run(
+    options: &Options,
+    progress: &(dyn Fn(Progress) + Sync),
+    page: Option<Page>,
+) -> Result<Solved, SolveError> {
+    Pool::new(options.threads).install(|| run_on_this_pool(options, progress, page))
 }
 
 /// Writes the page that a person looks at.
-pub type Page<'a> = &'a (dyn Fn(&Shown) -> String + Sync);
+type Page<'a> = &'a (dyn Fn(&Shown) -> String + Sync);
 
 /// What a page can show, before the solution stands under its name.
 pub struct Shown<'a> {
@@ -67,18 +69,6 @@ pub struct Shown<'a> {
     pub frames: &'a [(String, Image<[f32; 3]>)],
     /// What the solve says of itself; the page's own time is not in it yet.
     pub report: &'a Report,
-}
-
-/// As [`run`], with a page beside the maps.
-///
-/// # Errors
-/// As [`run`].
-pub fn run_with_page(
-    options: &Options,
-    progress: &(dyn Fn(Progress) + Sync),
-    page: Option<Page>,
-) -> Result<Solved, SolveError> {
-    Pool::new(options.threads).install(|| run_on_this_pool(options, progress, page))
 }
 
 fn run_on_this_pool(
@@ -125,10 +115,10 @@ fn make(
     inputs.still_the_same(session)?;
     warnings.extend(unverified(session));
     watch.lap(Stage::Read);
-    warnings.extend(leave_out_what_adds_nothing(&mut scene)?);
+    warnings.extend(scene.leave_out_what_adds_nothing()?);
     let mut swatch = None;
     if options.mask == MaskChoice::Found {
-        let found = find_swatch(&scene, &|_| {})?;
+        let found = scene.find_swatch(&|_| {})?;
         scene.mask = (found.table_share > 0.0).then_some(found.mask);
         swatch = Some(found.said);
     }
@@ -189,15 +179,16 @@ fn solve_into(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<(SolvedScene, Option<ResidualFiles>), SolveError> {
     let (method, device) = (options.method, &options.device);
+    let checked = scene.check()?;
     if options.residuals == Residuals::Leave {
-        return Ok((solve_scene_on(scene, method, device, progress)?, None));
+        return Ok((checked.solve(method, device, None, progress)?, None));
     }
     let lights = scene.lights.iter().map(|light| light.index).collect();
     let size_px = [scene.width, scene.height];
     let resampled = options.grid == Grid::Undistorted && scene.camera.is_some();
     let files = ResidualFiles::create(staged.path(), lights, size_px, resampled)?;
     let write = |light: usize, y: usize, values: &[f32]| files.write_row(light, y, values);
-    let solved = solve_scene_with_residuals(scene, method, device, &write, progress)?;
+    let solved = checked.solve(method, device, Some(&write), progress)?;
     Ok((solved, Some(files)))
 }
 
@@ -288,7 +279,7 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
     Report {
         schema: REPORT_SCHEMA,
         program: PROGRAM.to_owned(),
-        method: method_name(options.method).to_owned(),
+        method: options.method.name().to_owned(),
         size_px: [maps.mask.width, maps.mask.height],
         scale: options.scale as usize,
         lights_used: rest.lights_used.clone(),
@@ -316,26 +307,6 @@ fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Re
         device: None,
         key: None,
         swatch: None,
-    }
-}
-
-/// As the command line calls it.
-pub fn method_name(method: Method) -> &'static str {
-    match method {
-        Method::LeastSquares => "least-squares",
-        Method::Weighted => "weighted",
-        Method::Robust => "robust",
-        Method::Auto => "auto",
-    }
-}
-
-/// How a solution was solved; `None` where its report names a method that this version does not know. Reports without the
-/// key are of versions that knew one way only.
-pub fn method_of(report: &Report) -> Option<Method> {
-    let all = [Method::Auto, Method::LeastSquares, Method::Weighted, Method::Robust];
-    match report.method.as_str() {
-        "" => Some(Method::Auto),
-        name => all.into_iter().find(|method| method_name(*method) == name),
     }
 }
 

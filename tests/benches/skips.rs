@@ -1,5 +1,6 @@
 //! What leaving undone saves: each line is the time with and without, in one run.
 
+use super::solve;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,10 +12,9 @@ use weavelight::raster::{PngContent, write_png_grey16};
 use weavelight::raw::{Layout, Samples};
 use weavelight::report::page_of_solve;
 use weavelight::session::{FrameEntry, Kind, Session};
-use weavelight::solve::{
-    Options, Outputs, Reuse, Scale, Scene, find_swatch, leave_out_what_adds_nothing, progressively,
-    run_with_page, solve_scene,
-};
+use weavelight::solution::{Outputs, Reuse, Scale};
+use weavelight::solve::{Options, Scene};
+
 use weavelight_calibration::description::Image;
 
 /// Runs of each; the median counts.
@@ -52,7 +52,7 @@ fn median(work: &mut dyn FnMut()) -> Duration {
 }
 
 fn solving(scene: &Scene) -> Duration {
-    median(&mut || drop(black_box(solve_scene(scene, Method::Auto, &|_| {}).unwrap())))
+    median(&mut || drop(black_box(solve(scene, Method::Auto))))
 }
 
 fn table_outside_the_swatch(scene: &Scene) {
@@ -62,7 +62,7 @@ fn table_outside_the_swatch(scene: &Scene) {
     let masked =
         Scene { mask: Some(Image { width, height, data: data.collect() }), ..scene.clone() };
     line("table: three quarters of the frame", solving(scene), solving(&masked));
-    let finding = median(&mut || drop(black_box(find_swatch(scene, &|_| {}).unwrap())));
+    let finding = median(&mut || drop(black_box(scene.find_swatch(&|_| {}).unwrap())));
     println!("  {:<52} {:>8.1} ms", "  finding it", finding.as_secs_f64() * 1000.0);
 }
 
@@ -73,7 +73,7 @@ fn lights_that_add_nothing(scene: &Scene) {
         let search = median(&mut || {
             searched = spoilt.clone();
             let begun = Instant::now();
-            black_box(leave_out_what_adds_nothing(&mut searched).unwrap());
+            black_box(searched.leave_out_what_adds_nothing().unwrap());
             black_box(begun.elapsed());
         });
         let copying = median(&mut || drop(black_box(spoilt.clone())));
@@ -102,18 +102,10 @@ fn full_resolution(scene: &Scene) {
     for (name, scale) in [("1/8", Scale::Eighth), ("1/4", Scale::Quarter), ("1/2", Scale::Half)] {
         let time = median(&mut || {
             let small = scene.reduced(scale);
-            drop(black_box(solve_scene(&small, Method::LeastSquares, &|_| {}).unwrap()));
+            drop(black_box(solve(&small, Method::LeastSquares)));
         });
         line(&format!("full resolution: {name} of it, from frames in memory"), full, time);
     }
-    let begun = Instant::now();
-    let mut seen = vec![];
-    progressively(scene, Method::Auto, &|_| {}, &mut |level| {
-        seen.push(format!("{:?} {:.0} ms", level.scale, begun.elapsed().as_secs_f64() * 1000.0));
-        std::ops::ControlFlow::Continue(())
-    })
-    .unwrap();
-    println!("  all levels in turn, colours included: {}", seen.join(", "));
 }
 
 /// The whole run from folder to folder, and what of it need not be.
@@ -125,8 +117,9 @@ fn files(scene: &Scene) {
     let run = |options: &Options, page: bool| {
         median(&mut || {
             let show = |shown: &weavelight::solve::Shown| page_of_solve(shown, None);
-            let page: Option<weavelight::solve::Page> = page.then_some(&show);
-            drop(black_box(run_with_page(options, &|_| {}, page).unwrap()));
+            let page =
+                page.then_some(&show as &(dyn Fn(&weavelight::solve::Shown) -> String + Sync));
+            drop(black_box(weavelight::solve::run(options, &|_| {}, page).unwrap()));
         })
     };
     let all = run(&options, true);

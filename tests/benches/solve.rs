@@ -20,13 +20,15 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use weavelight::gpu::Device;
 use weavelight::gpu::Gpu;
 use weavelight::instrument::{CalibratedLight, Color, Noise};
 use weavelight::linear::{Exposure, PhotographedLight};
-use weavelight::photometry::{Method, Outcome};
+use weavelight::live::Accumulator;
+use weavelight::photometry::{Maps, Method, Outcome};
 use weavelight::raw::{Frame, Layout, Metadata, Samples};
-use weavelight::solve::preview::{Accumulator, Scale};
-use weavelight::solve::{Device, Origin, Scene, solve_scene, solve_scene_on};
+use weavelight::solution::Scale;
+use weavelight::solve::{Origin, Scene};
 use weavelight_calibration::description::{Camera, Cfa, Image, Light, Plane, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;
 use weavelight_calibration::projection::Projector;
@@ -76,10 +78,10 @@ fn in_memory((width, height): (usize, usize)) {
         ("weighted", Method::Weighted),
         ("auto", Method::Auto),
     ] {
-        line(name, median(&mut || drop(solve_scene(&scene, method, &|_| {}).unwrap())));
+        line(name, median(&mut || drop(solve(&scene, method))));
     }
     on_gpu(&scene, &line);
-    let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
+    let maps = solve(&scene, Method::Auto);
     println!(
         "  auto: {} of {} solved, {} by the robust path",
         maps.counts.solved(),
@@ -94,7 +96,7 @@ fn in_memory((width, height): (usize, usize)) {
     scene.mask = Some(Image { width, height, data });
     line(
         "auto, a quarter of the frame inside the mask",
-        median(&mut || drop(solve_scene(&scene, Method::Auto, &|_| {}).unwrap())),
+        median(&mut || drop(solve(&scene, Method::Auto))),
     );
     scene.mask = None;
     for (name, scale) in [
@@ -108,6 +110,10 @@ fn in_memory((width, height): (usize, usize)) {
     skips::report(&scene);
 }
 
+fn solve(scene: &Scene, method: Method) -> Maps {
+    scene.check().unwrap().solve(method, &Device::Cpu, None, &|_| {}).unwrap().maps
+}
+
 /// The same with a graphics processor, transfers included, where there is one.
 fn on_gpu(scene: &Scene, line: &dyn Fn(&str, Duration)) {
     let gpu = match Gpu::open() {
@@ -117,7 +123,9 @@ fn on_gpu(scene: &Scene, line: &dyn Fn(&str, Duration)) {
     let adapter = gpu.adapter().name.clone();
     let device = Device::Opened(Arc::new(gpu));
     for (name, method) in [("least squares", Method::LeastSquares), ("auto", Method::Auto)] {
-        let solve = || drop(solve_scene_on(scene, method, &device, &|_| {}).unwrap());
+        let solve = || {
+            drop(scene.check().unwrap().solve(method, &device, None, &|_| {}).unwrap());
+        };
         solve();
         line(&format!("{name}, on {adapter}"), median(&mut { solve }));
     }

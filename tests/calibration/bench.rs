@@ -124,7 +124,7 @@ impl Bench {
     /// Solves a capture session with a calibration into a folder of that name.
     pub fn solve(&self, session: &str, calibration: &Path, out: &str) -> Report {
         let options = solve::Options::new(self.rig(session), calibration, self.beside(out));
-        solve::run(&options, &|_| {}).unwrap().report
+        solve::run(&options, &|_| {}, None).unwrap().report
     }
 
     /// RMS over the lights of the distance between found and true positions.

@@ -93,7 +93,7 @@ fn lights_from_before_the_camera_are_told() {
 
 fn solve_fails(bench: &Bench, calibration: &Path, words: &[&str]) {
     let options = solve::Options::new(bench.rig("swatch"), calibration, bench.beside("out"));
-    let message = solve::run(&options, &|_| {}).unwrap_err().to_string();
+    let message = solve::run(&options, &|_| {}, None).unwrap_err().to_string();
     assert!(words.iter().all(|word| message.contains(word)), "{words:?}: {message}");
     assert!(!bench.beside("out").exists());
 }

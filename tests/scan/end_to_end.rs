@@ -14,7 +14,7 @@ use weavelight_sim::cloth::Preset;
 fn error_deg(laboratory: &Laboratory, session: &Path, name: &str) -> f64 {
     let out = laboratory.path(name);
     let calibration = laboratory.path("rig/calibration");
-    solve::run(&solve::Options::new(session.to_owned(), calibration, &out), &|_| ()).unwrap();
+    solve::run(&solve::Options::new(session.to_owned(), calibration, &out), &|_| (), None).unwrap();
     let options = compare::Options {
         a: out.join("normal.exr"),
         b: laboratory.path("rig/truth/normal.exr"),

@@ -7,10 +7,12 @@ use nalgebra::{
     IsometryMatrix3, Matrix2, Matrix3, Point3, Rotation3, Translation3, UnitVector3, Vector2,
     Vector3,
 };
+use weavelight::gpu::Device;
+use weavelight::photometry::Maps;
 use weavelight::photometry::{Method, Outcome};
 use weavelight::raw::{Frame, Layout, Samples};
 use weavelight::simulate::Material;
-use weavelight::solve::{Maps, Scene, solve_scene};
+use weavelight::solve::Scene;
 use weavelight_calibration::description::{Camera, Cfa, Image, Light, Plane};
 use weavelight_sim::cloth::Preset;
 
@@ -151,7 +153,7 @@ impl Turn {
 }
 
 fn solve(scene: &Scene) -> Maps {
-    solve_scene(scene, Method::Auto, &|_| {}).unwrap().0
+    scene.check().unwrap().solve(Method::Auto, &Device::Cpu, None, &|_| {}).unwrap().maps
 }
 
 /// How far two maps of one surface are apart.

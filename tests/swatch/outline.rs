@@ -6,7 +6,8 @@ use weavelight::linear::Exposure;
 use weavelight::raster::read_exr;
 use weavelight::raw::Samples;
 use weavelight::simulate::Material;
-use weavelight::solve::{Scene, Swatch, find_swatch};
+use weavelight::solve::Scene;
+use weavelight::swatch::Swatch;
 use weavelight_calibration::description::Image;
 use weavelight_sim::cloth::{Preset, Structure};
 
@@ -19,7 +20,7 @@ fn material(preset: Preset) -> Material {
 }
 
 fn find(scene: &Scene) -> Swatch {
-    find_swatch(scene, &|_| {}).unwrap()
+    scene.find_swatch(&|_| {}).unwrap()
 }
 
 /// Share of the frame that is table, and share of it that the mask keeps, after seeing that no photosite of cloth is lost.

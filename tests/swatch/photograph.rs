@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use weavelight::simulate::{self, Material, Part};
-use weavelight::solve::{Scene, load_scene};
+use weavelight::solve::Scene;
 use weavelight_sim::rig::REFERENCE_LIGHTS_MM;
 
 /// Lights of the reference rig.
@@ -53,7 +53,7 @@ impl Scan {
 
     /// The scan in memory, as a solve sees it, with the warnings.
     pub(crate) fn load(&self) -> (Scene, Vec<String>) {
-        load_scene(&self.path("swatch"), &self.path("calibration")).unwrap()
+        Scene::load(&self.path("swatch"), &self.path("calibration")).unwrap()
     }
 }
 

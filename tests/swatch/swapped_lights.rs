@@ -4,7 +4,7 @@
 use crate::photograph::{Field, LIGHTS, Scan};
 use crate::thorough;
 use weavelight::simulate::Material;
-use weavelight::solve::{Scene, leave_out_what_adds_nothing};
+use weavelight::solve::Scene;
 use weavelight_sim::cloth::Preset;
 
 fn swap(scene: &mut Scene, a: usize, b: usize) {
@@ -20,7 +20,7 @@ fn missed(scene: &Scene, turn: usize) -> Vec<String> {
     for (_, (a, b)) in pairs.enumerate().filter(|(k, _)| thorough::runs(*k, 4, turn)) {
         let mut scene = scene.clone();
         swap(&mut scene, a, b);
-        let warnings = leave_out_what_adds_nothing(&mut scene).unwrap();
+        let warnings = scene.leave_out_what_adds_nothing().unwrap();
         let expected = format!("Lights {a} and {b} seem to be swapped");
         if !matches!(warnings.as_slice(), [only] if only.starts_with(&expected)) {
             missed.push(format!("{a}-{b}: {}", warnings.join(" ")));
@@ -52,7 +52,7 @@ fn with_three_lights_it_cannot_be_told() {
     let (mut scene, _) = Scan::new(Field::Close, [96, 64], material, |_| {}).load();
     scene.lights.truncate(3);
     swap(&mut scene, 0, 1);
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+    let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(
         warnings.contains("nothing can tell whether one of them failed or two were swapped"),
         "{warnings}"

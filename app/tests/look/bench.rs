@@ -46,7 +46,7 @@ impl Bench {
         std::fs::create_dir_all(folder.parent().unwrap()).unwrap();
         let mut options = solve::Options::new(self.scan(), self.rig().join("calibration"), &folder);
         options.method = method;
-        solve::run(&options, &|_| {}).unwrap();
+        solve::run(&options, &|_| {}, None).unwrap();
         folder
     }
 
@@ -55,8 +55,8 @@ impl Bench {
         let folder = self.rig().join("solutions").join(name);
         let mut options = solve::Options::new(self.scan(), self.rig().join("calibration"), &folder);
         options.method = Method::LeastSquares;
-        options.scale = solve::Scale::Half;
-        solve::run(&options, &|_| {}).unwrap();
+        options.scale = weavelight::solution::Scale::Half;
+        solve::run(&options, &|_| {}, None).unwrap();
         folder
     }
 
@@ -67,7 +67,7 @@ impl Bench {
         copy(&self.scan(), &scan);
         copy(&self.rig().join("calibration"), &calibration);
         let options = solve::Options::new(&scan, &calibration, &solution);
-        solve::run(&options, &|_| {}).unwrap();
+        solve::run(&options, &|_| {}, None).unwrap();
         [scan, solution]
     }
 

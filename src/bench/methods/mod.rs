@@ -12,9 +12,10 @@ mod svd;
 #[cfg(test)]
 mod tests;
 
+use crate::gpu::Device;
 use crate::gpu::Gpu;
 use crate::photometry::{Method, reference_row};
-use crate::solve::{Device, Rows, SolveError, method_name, solve_scene_on};
+use crate::solve::{Rows, SolveError};
 use photosite::{Estimator, solve_row};
 use std::sync::Arc;
 use weavelight_calibration::description::Image;
@@ -99,13 +100,13 @@ fn on_gpu(gpu: Gpu) -> Contender {
 
 fn own_on(device: Device, method: Method, about: &'static str) -> Contender {
     let solve = move |rows: &Rows, _: usize| -> Result<Answer, SolveError> {
-        let maps = solve_scene_on(rows.scene(), method, &device, &|_| {})?.maps;
+        let maps = rows.scene().check()?.solve(method, &device, None, &|_| {})?.maps;
         let share = maps.counts.robust() as f64 / maps.counts.solved().max(1) as f64;
         let robust_share = matches!(method, Method::Auto | Method::Robust).then_some(share);
         Ok(Answer { normal: maps.normal, robust_share })
     };
     Contender {
-        name: method_name(method),
+        name: method.name(),
         about,
         pace: Pace::Frames,
         adapter: None,

@@ -1,11 +1,11 @@
 //! One picture under several names is noticed in whatever container it comes, and never suspected of two exposures.
 
-use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{add_noise, solve};
 use crate::linear::Exposure;
 use crate::photometry::Method;
 use crate::raw::Samples;
+use crate::solve::*;
 
 fn noisy(recipe: Recipe) -> Scene {
     let mut scene = scene(recipe);
@@ -46,7 +46,7 @@ fn a_picture_under_two_lights_is_left_out_in_whatever_container() {
     for (what, resave) in resaved {
         let mut copied = untouched.clone();
         copy(&mut copied, 3, 5, resave);
-        let warnings = leave_out_what_adds_nothing(&mut copied).unwrap().join("\n");
+        let warnings = copied.leave_out_what_adds_nothing().unwrap().join("\n");
         assert!(warnings.contains("Lights 3 and 5 have the same picture"), "{what}: {warnings}");
         assert!(warnings.contains("copies of one frame"), "{what}: {warnings}");
         assert!(solve(&copied, Method::Auto) == known, "{what}");
@@ -55,7 +55,7 @@ fn a_picture_under_two_lights_is_left_out_in_whatever_container() {
     let samples = numbers(&floating.lights[3].exposures[0]);
     let samples = samples.iter().map(|&v| f32::from(v) / 65_535.0).collect();
     floating.lights[5].exposures[0].frame.samples = Samples::F32(samples);
-    let warnings = leave_out_what_adds_nothing(&mut floating).unwrap().join("\n");
+    let warnings = floating.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(warnings.contains("Lights 3 and 5 have the same picture"), "{warnings}");
 }
 
@@ -64,7 +64,7 @@ fn with_fewer_than_three_pictures_of_their_own_there_is_an_error() {
     for copies in [10, 8] {
         let mut scene = noisy(Recipe::default());
         (1..copies).for_each(|light| copy(&mut scene, 0, light, &|v| v));
-        let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
+        let error = scene.leave_out_what_adds_nothing().unwrap_err().to_string();
         for part in ["have the same picture", "a solve needs three", "Lights 0, 1, 2"] {
             assert!(error.contains(part), "{copies}: {error}");
         }
@@ -73,7 +73,7 @@ fn with_fewer_than_three_pictures_of_their_own_there_is_an_error() {
     // Far lights over whatever surface.
     let mut scene = noisy(Recipe { directional: true, ..Recipe::default() });
     (1..10).for_each(|light| copy(&mut scene, 0, light, &|v| v));
-    assert!(leave_out_what_adds_nothing(&mut scene).is_err());
+    assert!(scene.leave_out_what_adds_nothing().is_err());
 }
 
 #[test]
@@ -84,7 +84,7 @@ fn a_picture_at_two_exposures_of_a_light_is_not_used() {
     again.exposure_s *= 2.0;
     again.path = "again.dng".into();
     scene.lights[3].exposures.push(again);
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+    let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(warnings.contains("again.dng of light 3 are copies of one picture"), "{warnings}");
     assert!(solve(&scene, Method::Auto) == known);
 }
@@ -94,7 +94,7 @@ fn a_light_with_the_picture_of_the_ambient_light_is_left_out() {
     let mut scene = noisy(Recipe { ambient: true, ..Recipe::default() });
     let known = solve(&without(scene.clone(), &[3]), Method::Auto);
     scene.lights[3].exposures[0].frame = scene.ambient[0].frame.clone();
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+    let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(warnings.contains("Light 3 and ambient light have the same picture"), "{warnings}");
     assert!(solve(&scene, Method::Auto) == known);
 }
@@ -104,7 +104,7 @@ fn an_ambient_frame_with_the_picture_of_a_light_is_refused() {
     let mut scene = noisy(Recipe { ambient: true, ..Recipe::default() });
     scene.ambient[0].frame = scene.lights[3].exposures[0].frame.clone();
     scene.ambient[0].exposure_s = scene.lights[3].exposures[0].exposure_s;
-    let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
+    let error = scene.leave_out_what_adds_nothing().unwrap_err().to_string();
     assert!(error.contains("ambient.png is brighter than"), "{error}");
     assert!(error.contains("is it the frame of a light"), "{error}");
 }
@@ -119,7 +119,7 @@ fn two_exposures_are_no_copies() {
     again.path = "again.png".into();
     scene.lights[7].exposures.push(again);
     add_noise(&mut scene, 40_000.0 / 64_400.0);
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+    let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(!warnings.contains("copies") && !warnings.contains("same picture"), "{warnings}");
     assert_eq!((scene.lights.len(), scene.lights[7].exposures.len()), (10, 2));
 }

@@ -1,11 +1,11 @@
 //! Frames without light are named, or refused; nothing is solved from noise.
 
-use super::super::*;
 use super::scenes::{Dice, Recipe, scene};
 use super::{add_noise, solve};
 use crate::linear::{Exposure, PhotographedLight};
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
+use crate::solve::*;
 use weavelight_calibration::description::Cfa;
 
 const WIDTH: usize = 96;
@@ -37,7 +37,7 @@ fn room_light(at: usize) -> f64 {
 }
 
 fn error_of(mut scene: Scene) -> String {
-    let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
+    let error = scene.leave_out_what_adds_nothing().unwrap_err().to_string();
     assert!(error.lines().count() <= 2, "{error}");
     error
 }
@@ -83,7 +83,7 @@ fn half_of_the_lights_dark_leaves_the_maps_of_the_others() {
         let seed = light.index as u64;
         fill(&mut light.exposures[0], seed, 6.0, &room_light);
     }
-    let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+    let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(
         warnings.contains("Lights 1, 3, 5, 7 and 9 show no signal above noise and were left out"),
         "{warnings}"
@@ -124,7 +124,7 @@ fn an_ambient_frame_that_is_none_is_refused() {
         600.0 + [0.02, 0.015, 0.01][channel] * 6.0 * 64_400.0
     };
     fill(&mut scene.ambient[0], 5, 30.0, &level);
-    assert_eq!(leave_out_what_adds_nothing(&mut scene).unwrap(), [""; 0]);
+    assert_eq!(scene.leave_out_what_adds_nothing().unwrap(), [""; 0]);
 }
 
 #[test]
@@ -146,9 +146,9 @@ fn a_dead_channel_is_named() {
         let mut one = all.clone();
         all.lights.iter_mut().for_each(kill);
         kill(&mut one.lights[6]);
-        let warnings = leave_out_what_adds_nothing(&mut all).unwrap().join("\n");
+        let warnings = all.leave_out_what_adds_nothing().unwrap().join("\n");
         assert!(warnings.contains("No frame shows any blue light above noise"), "{warnings}");
-        let warnings = leave_out_what_adds_nothing(&mut one).unwrap().join("\n");
+        let warnings = one.leave_out_what_adds_nothing().unwrap().join("\n");
         assert!(warnings.contains("light 6 show no blue light above noise"), "{warnings}");
     }
 }

@@ -1,15 +1,19 @@
 //! The run from folder to folder, over small capture sessions of 16-bit PNG.
 
-use super::super::finish::finish;
-use super::super::*;
 use super::scenes::{Recipe, scene};
+use super::with_warnings;
 use crate::files::Provenance;
 use crate::instrument::{MeasuredCamera, write_camera, write_color, write_lights};
 use crate::linear::Exposure;
+use crate::photometry::Albedo;
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
 use crate::session::{FrameEntry, Kind, Session};
 use crate::solution;
+use crate::solution::{AlbedoKind, Grid, NormalY, Outputs, Residuals, Reuse};
+use crate::solve::output::finish::finish;
+use crate::solve::*;
+use crate::swatch::MaskChoice;
 use std::collections::BTreeMap;
 use std::path::Path;
 use weavelight_calibration::description::Light;
@@ -53,7 +57,7 @@ impl Folders {
     }
 
     fn run(&self, options: &Options) -> BTreeMap<String, Vec<u8>> {
-        run(options, &|_| {}).unwrap();
+        run(options, &|_| {}, None).unwrap();
         let files = std::fs::read_dir(&options.out).unwrap().map(|entry| entry.unwrap());
         files
             .map(|file| {
@@ -119,7 +123,7 @@ fn a_run_writes_what_the_kernels_found() {
             "shade.exr",
         ];
         assert_eq!(names(&files), expected);
-        let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
+        let (maps, _) = with_warnings(&scene, Method::Auto).unwrap();
         let exr = crate::raster::read_exr(&options.out.join("normal.exr")).unwrap();
         for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
             let written = exr.channel(name).unwrap();
@@ -143,7 +147,7 @@ fn albedo_times_shade_is_the_photosites_own_value() {
     let recipe =
         Recipe { width: 160, height: 150, layout: Layout::Mosaic(cfa), ..Recipe::default() };
     let scene = scene(recipe);
-    let (maps, _) = solve_scene(&scene, Method::Auto, &|_| {}).unwrap();
+    let (maps, _) = with_warnings(&scene, Method::Auto).unwrap();
     let Albedo::Mosaic(own, _) = &maps.albedo else { panic!("a mosaic gives a mosaic") };
     let own = own.clone();
     let inverse = scene.color.camera_to_linear_srgb.map(|matrix| matrix.try_inverse().unwrap());
@@ -229,7 +233,7 @@ fn what_does_not_belong_together_is_told_with_the_remedy() {
         let mut scene = scene(Recipe { width: 12, height: 8, ambient: true, ..Recipe::default() });
         change(&mut scene);
         let folders = Folders::of(&scene);
-        let error = run(&folders.options(), &|_| {}).unwrap_err().to_string();
+        let error = run(&folders.options(), &|_| {}, None).unwrap_err().to_string();
         assert!(error.contains(expected), "expected {expected:?}, got: {error}");
         assert!(error.lines().count() <= 2, "{error}");
         assert!(!folders.options().out.exists(), "something was left behind");
@@ -273,7 +277,7 @@ fn frames_that_are_missing_or_too_many_are_told() {
         let mut folders = Folders::of(&scene(Recipe { width: 12, height: 8, ..Recipe::default() }));
         change(&mut folders.session);
         folders.session.save().unwrap();
-        let error = run(&folders.options(), &|_| {}).unwrap_err().to_string();
+        let error = run(&folders.options(), &|_| {}, None).unwrap_err().to_string();
         assert!(error.contains(expected), "expected {expected:?}, got: {error}");
     };
     check("frames of 2 lights only", &|session| session.frames.truncate(2));
@@ -295,7 +299,7 @@ fn a_light_without_a_frame_and_a_light_that_drifts_are_warned_about() {
     folders.session.frames[2].drift_check = true;
     folders.session.frames.remove(4);
     folders.session.save().unwrap();
-    let report = run(&folders.options(), &|_| {}).unwrap().report;
+    let report = run(&folders.options(), &|_| {}, None).unwrap().report;
     assert_eq!(report.lights_used, [0, 1, 2, 4]);
     let warnings = report.warnings.join("\n");
     assert!(warnings.contains("Light 3 has no frame"), "{warnings}");
@@ -316,7 +320,7 @@ fn a_mask_keeps_the_table_out_and_changes_nothing_inside() {
     let options = Options { mask: MaskChoice::File(path), ..folders.options() };
     folders.run(&options);
     let masked = crate::raster::read_exr(&options.out.join("normal.exr")).unwrap();
-    let (whole, _) = solve_scene(&made, Method::Auto, &|_| {}).unwrap();
+    let (whole, _) = with_warnings(&made, Method::Auto).unwrap();
     let mut solved = 0;
     for y in 0..50 {
         for x in 0..90 {
@@ -362,7 +366,7 @@ fn what_is_up_to_date_is_not_made_again() {
         Folders::of(&scene(Recipe { width: 12, height: 8, lights: 5, ..Recipe::default() }));
     let options = Options { reuse: Reuse::IfCurrent, ..folders.options() };
     let check = |what: &str, options: &Options, expected: bool| {
-        let solved = run(options, &|_| {}).unwrap();
+        let solved = run(options, &|_| {}, None).unwrap();
         assert_eq!(solved.up_to_date, expected, "{what}");
         let on_disk = solution::Solution::load(&options.out).unwrap().report;
         assert_eq!(solved.report, on_disk, "{what}");
@@ -380,7 +384,7 @@ fn what_is_up_to_date_is_not_made_again() {
     folders.session.save().unwrap();
     check("another manifest", &robust, false);
     std::fs::write(folders.session.frame_path(&folders.session.frames[0]), b"altered").unwrap();
-    assert!(run(&robust, &|_| {}).unwrap_err().to_string().contains("altered"));
+    assert!(run(&robust, &|_| {}, None).unwrap_err().to_string().contains("altered"));
 }
 
 #[test]
@@ -411,9 +415,9 @@ fn residuals_are_written_where_they_are_asked_for() {
     // Threads, reuse, the other grid.
     assert!(folders.run(&Options { threads: Some(1), ..asked.clone() }) == files);
     asked.reuse = Reuse::IfCurrent;
-    assert!(run(&asked, &|_| {}).unwrap().up_to_date);
+    assert!(run(&asked, &|_| {}, None).unwrap().up_to_date);
     std::fs::remove_file(asked.out.join("residual-02.exr")).unwrap();
-    assert!(!run(&asked, &|_| {}).unwrap().up_to_date);
+    assert!(!run(&asked, &|_| {}, None).unwrap().up_to_date);
     let undistorted = folders.run(&Options { grid: Grid::Undistorted, ..asked.clone() });
     assert!(undistorted["residual-00.exr"] != files["residual-00.exr"]);
     assert_eq!(undistorted["residual-00.exr"].len(), files["residual-00.exr"].len());

@@ -1,16 +1,18 @@
 //! What the solve made of small scenes when its revision was raised last. A change that moves a number here must raise
-//! [`REVISION`](super::super::current::REVISION), or solutions made before it pass for up to date.
+//! [`REVISION`](crate::solve::current::REVISION), or solutions made before it pass for up to date.
 //!
 //! Kernels do the same operations in the same order on every processor; the tolerance is for mathematical functions of
 //! other libraries and for the last bits of float64 sums.
 
-use super::super::current::REVISION;
-use super::super::finish::{finish, undistort};
-use super::super::*;
 use super::add_noise;
 use super::scenes::{Recipe, scene};
+use super::with_warnings;
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
+use crate::solution::{AlbedoKind, Outputs};
+use crate::solve::current::REVISION;
+use crate::solve::output::finish::{finish, undistort};
+use crate::solve::*;
 use std::fmt::Write;
 
 const GOLDEN: &str = include_str!("golden.txt");
@@ -65,11 +67,11 @@ fn lines() -> Vec<String> {
     let mut lines = vec![format!("revision {REVISION}")];
     for (name, scene) in &scenes {
         for method in [Method::LeastSquares, Method::Weighted, Method::Robust, Method::Auto] {
-            let (maps, _) = solve_scene(scene, method, &|_| {}).unwrap();
+            let (maps, _) = with_warnings(scene, method).unwrap();
             let outcomes = maps.counts.outcomes.map(|count| count.to_string()).join(" ");
             let finished = finish(maps, &scene.color, Outputs::ALL, AlbedoKind::Reflectance);
             let flat = undistort(&finished, scene.camera.as_ref().unwrap());
-            let mut line = format!("{name}, {}: {outcomes};", method_name(method));
+            let mut line = format!("{name}, {}: {outcomes};", method.name());
             for maps in [&finished, &flat] {
                 for [sum, size] in [
                     sums(maps.normal.data.iter().flatten().copied()),

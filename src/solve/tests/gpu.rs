@@ -1,11 +1,15 @@
 //! The whole run with a graphics processor against the same without: flags, masks, counts and maps.
 
 use super::scenes::{Recipe, scene};
+use super::{solved_on, with_warnings};
+use crate::gpu::Device;
 use crate::gpu::{Gpu, GpuError};
 use crate::photometry::Method;
+use crate::photometry::{Albedo, Maps};
 use crate::raw::{Layout, Samples};
-use crate::solve::in_memory::{light_field, noise};
-use crate::solve::{Albedo, Device, Maps, Scene, SolvedScene, solve_scene, solve_scene_on};
+use crate::solve::bands::noise;
+use crate::solve::scene::checked::light_field;
+use crate::solve::{Scene, SolvedScene};
 use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
 use weavelight_calibration::description::{Cfa, Image};
@@ -34,9 +38,9 @@ fn albedo_values(maps: &Maps) -> Vec<f32> {
 
 fn check_same(name: &str, scene: &Scene, method: Method) {
     let name = format!("{name}, {method:?}");
-    let solved = solve_scene_on(scene, method, &Device::Opened(gpu()), &|_| {});
+    let solved = solved_on(scene, method, &Device::Opened(gpu()));
     let SolvedScene { maps: there, device, warnings } = solved.expect("a scene that can be solved");
-    let (here, _) = solve_scene(scene, method, &|_| {}).expect("a scene that can be solved");
+    let (here, _) = with_warnings(scene, method).expect("a scene that can be solved");
     assert_eq!((device.kind.as_str(), warnings.len()), ("gpu", 0), "{name}: {warnings:?}");
     assert!(device.sent_mb > Some(0.0) && device.received_mb > Some(0.0), "{name}: {device:?}");
     assert_eq!(there.outcome, here.outcome, "{name}");
@@ -112,8 +116,8 @@ fn a_driver_that_fails_costs_no_photosite() {
     let spoilt = Gpu::open().expect("a device");
     spoilt.spoil();
     let device = Device::Opened(Arc::new(spoilt));
-    let solved = solve_scene_on(&made, Method::Auto, &device, &|_| {}).expect("a scene");
-    let (here, _) = solve_scene(&made, Method::Auto, &|_| {}).expect("a scene");
+    let solved = solved_on(&made, Method::Auto, &device).expect("a scene");
+    let (here, _) = with_warnings(&made, Method::Auto).expect("a scene");
     assert_eq!((solved.maps.normal, solved.maps.outcome), (here.normal, here.outcome));
     let [warning] = solved.warnings.as_slice() else { panic!("{:?}", solved.warnings) };
     assert!(warning.contains("failed (spoilt by a test); the processor solved"), "{warning}");
@@ -126,9 +130,9 @@ fn what_is_measured_decides() {
     let run = crate::solve::bands::Run::new(&made, &field, noise(&made, &field), Method::Auto);
     let folder = tempfile::tempdir().expect("a folder");
     let memory = folder.path().join("device.json");
-    let first = crate::solve::device::faster(&run, Some(&memory));
+    let first = crate::solve::bands::faster(&run, Some(&memory));
     assert!(first.why.starts_with("measured: "), "{}", first.why);
-    let second = crate::solve::device::faster(&run, Some(&memory));
+    let second = crate::solve::bands::faster(&run, Some(&memory));
     assert!(second.why.starts_with("remembered: "), "{}", second.why);
     assert_eq!(first.gpu.is_some(), second.gpu.is_some());
     assert_eq!(first.why.split(": ").nth(1), second.why.split(": ").nth(1));
@@ -138,7 +142,7 @@ fn what_is_measured_decides() {
 fn who_solves_where_nothing_is_to_be_gained() {
     let made = scene(Recipe::default());
     let check = |device: Device, method: Method, why: &str| {
-        let solved = solve_scene_on(&made, method, &device, &|_| {}).expect("a scene");
+        let solved = solved_on(&made, method, &device).expect("a scene");
         assert_eq!(solved.device.kind, "cpu", "{device:?}");
         assert!(solved.device.why.contains(why), "{device:?}: {}", solved.device.why);
         solved.warnings.len()

@@ -1,11 +1,12 @@
 //! What adds nothing is left out, is named, and changes nothing.
 
-use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{SAME_NORMAL_DEG, angle_deg, solve};
 use crate::linear::Exposure;
+use crate::photometry::Maps;
 use crate::photometry::Method;
 use crate::raw::Samples;
+use crate::solve::*;
 use nalgebra::Vector3;
 use weavelight_calibration::description::Image;
 
@@ -37,7 +38,7 @@ fn check(expected: &str, spoil: impl Fn(&mut Scene)) -> (Maps, Scene) {
     let mut spoilt = untouched.clone();
     spoil(&mut spoilt);
     let as_spoilt = spoilt.clone();
-    let warnings = leave_out_what_adds_nothing(&mut spoilt).unwrap().join("\n");
+    let warnings = spoilt.leave_out_what_adds_nothing().unwrap().join("\n");
     assert!(warnings.contains(expected), "expected {expected:?}, got: {warnings}");
     let (found, known) = (solve(&spoilt, Method::Auto), solve(&untouched, Method::Auto));
     assert!(found == known, "{expected}: the maps are not those without it");
@@ -61,7 +62,7 @@ fn frames_that_add_nothing_change_nothing() {
 fn a_second_picture_counts() {
     let mut scene = scene(Recipe::default());
     expose_again(&mut scene, 3, "again.dng", |sample| sample + sample % 2);
-    assert_eq!(leave_out_what_adds_nothing(&mut scene).unwrap(), [""; 0]);
+    assert_eq!(scene.leave_out_what_adds_nothing().unwrap(), [""; 0]);
     assert_eq!(scene.lights[3].exposures.len(), 2);
 }
 
@@ -80,7 +81,7 @@ fn a_light_that_clips_everywhere_is_left_out() {
     clip(&mut clipped, 6, |_| true);
     without.lights.remove(6);
     let as_clipped = solve(&clipped, Method::Weighted);
-    let warnings = leave_out_what_adds_nothing(&mut clipped).unwrap();
+    let warnings = clipped.leave_out_what_adds_nothing().unwrap();
     assert_eq!(warnings, ["Light 6 is clipped everywhere and was left out."]);
     let (left, known) = (solve(&clipped, Method::Weighted), solve(&without, Method::Weighted));
     assert!(left == known, "not the maps of the other lights");
@@ -95,7 +96,7 @@ fn only_the_swatch_says_whether_a_light_clips() {
         let data = (0..70 * 50).map(inside).collect();
         scene.mask = Some(Image { width: 70, height: 50, data });
         clip(&mut scene, 2, places);
-        leave_out_what_adds_nothing(&mut scene).unwrap();
+        scene.leave_out_what_adds_nothing().unwrap();
         scene.lights.len()
     };
     assert_eq!(make(&inside), 9, "clipped wherever the swatch is");
@@ -109,7 +110,7 @@ fn with_fewer_than_three_lights_that_do_not_clip_there_is_an_error() {
     let check = |lights: usize, clipped: &[usize], expected: &str| {
         let mut scene = scene(Recipe { lights, ..Recipe::default() });
         clipped.iter().for_each(|&light| clip(&mut scene, light, |_| true));
-        let error = leave_out_what_adds_nothing(&mut scene).unwrap_err().to_string();
+        let error = scene.leave_out_what_adds_nothing().unwrap_err().to_string();
         assert!(error.contains(expected) && error.contains("take shorter exposures"), "{error}");
     };
     check(3, &[1], "light 1 is clipped everywhere");

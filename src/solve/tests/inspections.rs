@@ -1,6 +1,7 @@
 //! A solve looked at closely says what the whole solve did.
 
 use super::*;
+use crate::photometry::{Part, Photosite, Sample, is_solved};
 
 /// float32, summed in another order at most.
 const SAME: f32 = 1e-6;

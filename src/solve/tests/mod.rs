@@ -12,12 +12,15 @@ mod reduced;
 mod residuals;
 mod scenes;
 
-use super::bands::Run;
-use super::in_memory::{light_field, noise};
-use super::reference::solve_exactly;
 use super::*;
+use crate::gpu::Device;
+use crate::photometry::{Albedo, Maps, is_solved};
 use crate::photometry::{Method, Outcome, Pixel, RowSolver};
 use crate::raw::{Layout, Samples};
+use crate::solve::bands::Run;
+use crate::solve::bands::noise;
+use crate::solve::bands::reference::solve_exactly;
+use crate::solve::scene::checked::light_field;
 use nalgebra::Vector3;
 use scenes::{Recipe, albedo_at, normal_at, scene};
 use weavelight_calibration::description::{Cfa, DirectionalLight, Image, Light};
@@ -27,8 +30,18 @@ const SAME_NORMAL_DEG: f64 = 1e-3;
 /// float32 keeps seven digits; the light field's grid is good to 1e-5.
 const SAME_ALBEDO: f64 = 5e-5;
 
+/// Maps and warnings of a scene.
+fn with_warnings(scene: &Scene, method: Method) -> Result<(Maps, Vec<String>), SolveError> {
+    let SolvedScene { maps, warnings, .. } = solved_on(scene, method, &Device::Cpu)?;
+    Ok((maps, warnings))
+}
+
+fn solved_on(scene: &Scene, method: Method, device: &Device) -> Result<SolvedScene, SolveError> {
+    scene.check()?.solve(method, device, None, &|_| {})
+}
+
 fn solve(scene: &Scene, method: Method) -> Maps {
-    solve_scene(scene, method, &|_| {}).expect("the scene can be solved").0
+    with_warnings(scene, method).expect("the scene can be solved").0
 }
 
 fn angle_deg(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
@@ -152,7 +165,7 @@ fn lights_that_contradict_the_others_are_named() {
         for seed in 20..24 {
             let mut scene = scene(Recipe { seed, ..Recipe::default() });
             change(&mut scene);
-            let warnings = leave_out_what_adds_nothing(&mut scene).unwrap().join("\n");
+            let warnings = scene.leave_out_what_adds_nothing().unwrap().join("\n");
             let told = expected.iter().all(|part| warnings.contains(part));
             assert!(
                 told && warnings.is_empty() == expected.is_empty(),
@@ -207,7 +220,7 @@ fn poorly_spread_lights_are_warned_about() {
                 intensity: [1.0; 3],
             });
         }
-        let warnings = solve_scene(&scene, Method::LeastSquares, &|_| {}).unwrap().1.join("\n");
+        let warnings = with_warnings(&scene, Method::LeastSquares).unwrap().1.join("\n");
         assert!(warnings.contains(expected), "{elevation_deg}: {warnings:?}");
         assert_eq!(warnings.is_empty(), expected.is_empty(), "{elevation_deg}: {warnings}");
     };

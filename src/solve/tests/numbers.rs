@@ -1,11 +1,13 @@
 //! Whatever the inputs, no map holds NaN or infinity, and odd sizes are pictures too.
 
-use super::super::finish::{finish, leave_out_what_is_not_finite};
-use super::super::*;
 use super::scenes::{Recipe, scene};
+use super::with_warnings;
 use crate::linear::PhotographedLight;
 use crate::photometry::Method;
 use crate::raw::{Layout, Samples};
+use crate::solution::{AlbedoKind, Outputs};
+use crate::solve::output::finish::{finish, leave_out_what_is_not_finite};
+use crate::solve::*;
 use nalgebra::Matrix3;
 use weavelight_calibration::description::{Image, Light};
 
@@ -15,7 +17,7 @@ const METHODS: [Method; 4] = [Method::LeastSquares, Method::Weighted, Method::Au
 fn check(what: &str, scene: &Scene) -> usize {
     let mut solved = 0;
     for method in METHODS {
-        let Ok((maps, _)) = solve_scene(scene, method, &|_| {}) else { continue };
+        let Ok((maps, _)) = with_warnings(scene, method) else { continue };
         assert!(maps.counts.residual_rms().is_finite(), "{what} {method:?}: residual");
         let mut maps = finish(maps, &scene.color, Outputs::ALL, AlbedoKind::Reflectance);
         leave_out_what_is_not_finite(&mut maps);
@@ -79,7 +81,7 @@ fn every_size_is_a_picture() {
                     scene.color.noise = None;
                 }
                 let what = format!("{width} x {height} {layout:?}");
-                leave_out_what_adds_nothing(&mut scene).unwrap();
+                scene.leave_out_what_adds_nothing().unwrap();
                 assert_eq!(check(&what, &scene), METHODS.len() * width * height, "{what}");
             }
         }
@@ -94,7 +96,7 @@ fn masks_and_clipping_leave_nothing_odd() {
     assert_eq!(check("all masked", &masked), 0);
     masked.mask.as_mut().unwrap().data[100] = true;
     assert_eq!(check("one photosite", &masked), METHODS.len());
-    leave_out_what_adds_nothing(&mut masked).unwrap();
+    masked.leave_out_what_adds_nothing().unwrap();
     let mut clipped = scene(small);
     for light in &mut clipped.lights {
         light.exposures[0].frame.samples = Samples::U16(vec![u16::MAX; 24 * 16]);
@@ -102,13 +104,13 @@ fn masks_and_clipping_leave_nothing_odd() {
     assert_eq!(check("all clipped", &clipped), 0);
     // Of two exposures of each light the long one clips everywhere.
     let mut long = scene(Recipe { exposures: 2, ..small });
-    let known = solve_scene(&scene(small), Method::Auto, &|_| {}).unwrap().0;
+    let known = with_warnings(&scene(small), Method::Auto).unwrap().0;
     for light in &mut long.lights {
         light.exposures[1].frame.samples = Samples::U16(vec![u16::MAX; 24 * 16]);
     }
     check("long ones clipped", &long);
-    leave_out_what_adds_nothing(&mut long).unwrap();
-    assert!(solve_scene(&long, Method::Auto, &|_| {}).unwrap().0 == known);
+    long.leave_out_what_adds_nothing().unwrap();
+    assert!(with_warnings(&long, Method::Auto).unwrap().0 == known);
 }
 
 /// A light that sinks below the plane across the frame, and one that stands under the table.
@@ -119,7 +121,7 @@ fn lights_at_and_below_the_plane_are_named() {
             light.position_mm.z = z;
         }
     };
-    let warnings = |scene: &Scene| solve_scene(scene, Method::Auto, &|_| {}).unwrap().1.join("\n");
+    let warnings = |scene: &Scene| with_warnings(scene, Method::Auto).unwrap().1.join("\n");
     let mut made = scene(Recipe::default());
     assert_eq!(warnings(&made), "");
     lower(&mut made, 4, -300.0);
@@ -142,6 +144,6 @@ fn lights_at_and_below_the_plane_are_named() {
     }
     let mut low = scene(Recipe::default());
     (0..8).for_each(|light| lower(&mut low, light, -300.0));
-    let error = solve_scene(&low, Method::Auto, &|_| {}).unwrap_err().to_string();
+    let error = with_warnings(&low, Method::Auto).unwrap_err().to_string();
     assert!(error.contains("stand at or below the plane of the swatch"), "{error}");
 }

@@ -1,9 +1,11 @@
-use super::super::preview::{Accumulator, Preview, Scale};
-use super::super::*;
 use super::scenes::{Recipe, albedo_at, scene};
 use super::{angle_deg, solve};
 use crate::instrument::{Calibration, CalibrationProvenance};
+use crate::live::{Accumulator, Preview};
+use crate::photometry::Maps;
 use crate::photometry::Method;
+use crate::solution::Scale;
+use crate::solve::*;
 use nalgebra::Vector3;
 
 /// Interpolating the inverse of the normal equations over the grid of the light field.

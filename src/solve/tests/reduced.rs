@@ -1,15 +1,15 @@
 //! Previews of a finished capture session: what they are means of, and that the last of them is the solution itself.
 
-use super::super::preview::{Accumulator, Scale};
-use super::super::*;
 use super::scenes::{Recipe, scene};
 use super::{angle_deg, check_scene_against_reference, solve};
 use crate::instrument::{Calibration, CalibrationProvenance, Defects};
 use crate::linear::Reading;
+use crate::live::Accumulator;
 use crate::photometry::Method;
 use crate::raw::{Frame, Layout, Samples};
+use crate::solution::Scale;
+use crate::solve::*;
 use nalgebra::Vector3;
-use std::ops::ControlFlow;
 use weavelight_calibration::description::{Cfa, Image};
 use weavelight_calibration::projection::Projector;
 
@@ -134,7 +134,8 @@ fn reduced_pixels_look_where_their_blocks_do() {
     let scene = scene(Recipe::default());
     let camera = scene.camera.as_ref().unwrap();
     for scale in [Scale::Half, Scale::Quarter, Scale::Eighth] {
-        let (small, side) = (reduced_camera(camera, scale), scale as usize as f64);
+        let (small, side) =
+            (crate::solve::scene::reduce::reduced_camera(camera, scale), scale as usize as f64);
         for [u, v] in [[0.0, 0.0], [3.0, 2.0], [7.0, 5.0]] {
             let middle = [u * side + (side - 1.0) / 2.0, v * side + (side - 1.0) / 2.0];
             let a = Projector::new(&small).on_plane([u, v], &scene.plane).unwrap();
@@ -179,49 +180,4 @@ fn streamed_sums_show_the_same_as_means() {
             assert!(off < SAME_PREVIEW_DEG, "{scale:?}: {off} degrees");
         }
     }
-}
-
-#[test]
-fn the_levels_are_the_solutions_they_claim_and_the_last_is_the_full_one() {
-    let scene = scene(Recipe { width: 90, ambient: true, ..Recipe::default() });
-    let mut levels = vec![];
-    progressively(&scene, Method::Auto, &|_| {}, &mut |level| {
-        levels.push(level);
-        ControlFlow::Continue(())
-    })
-    .unwrap();
-    let scales: Vec<Scale> = levels.iter().map(|level| level.scale).collect();
-    assert_eq!(scales, Scale::GROWING);
-    for level in &levels {
-        let (claimed, method) = match level.scale {
-            Scale::Full => (scene.clone(), Method::Auto),
-            scale => (scene.reduced(scale), Method::LeastSquares),
-        };
-        let maps = solve(&claimed, method);
-        assert_eq!(
-            (level.maps.mask.width, level.maps.mask.height),
-            (claimed.width, claimed.height)
-        );
-        assert_eq!(level.maps.normal, maps.normal, "{:?}", level.scale);
-        assert_eq!(level.maps.confidence, maps.expected_error_deg, "{:?}", level.scale);
-        assert_eq!(level.counts, maps.counts, "{:?}", level.scale);
-        let solved = level.maps.mask.data.iter().filter(|&&solved| solved == 255).count();
-        assert_eq!(solved, level.counts.solved(), "{:?}", level.scale);
-    }
-}
-
-#[test]
-fn whoever_has_seen_enough_breaks_off() {
-    let scene = scene(Recipe::default());
-    let mut seen = 0;
-    progressively(&scene, Method::Auto, &|_| {}, &mut |level| {
-        seen += 1;
-        if level.scale == Scale::Quarter {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    })
-    .unwrap();
-    assert_eq!(seen, 2);
 }

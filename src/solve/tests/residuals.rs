@@ -1,12 +1,16 @@
 //! What the fit leaves over of each light.
 
-use super::super::bands::Run;
-use super::super::in_memory::{light_field, noise};
-use super::super::reference::signal;
-use super::super::*;
 use super::scenes::{Recipe, normal_at, scene};
+use super::with_warnings;
+use crate::gpu::Device;
+use crate::photometry::{Maps, is_solved};
 use crate::photometry::{Method, Outcome};
 use crate::raw::{Layout, Samples};
+use crate::solve::bands::Run;
+use crate::solve::bands::noise;
+use crate::solve::bands::reference::signal;
+use crate::solve::scene::checked::light_field;
+use crate::solve::*;
 use nalgebra::Vector3;
 use std::sync::Mutex;
 use weavelight_calibration::description::Image;
@@ -18,7 +22,7 @@ fn with_residuals(scene: &Scene, method: Method) -> (Maps, Vec<Image<f32>>) {
         images.lock().unwrap()[light].data[y * scene.width..][..scene.width]
             .copy_from_slice(values);
     };
-    let solved = solve_scene_with_residuals(scene, method, &Device::Cpu, &take, &|_| {}).unwrap();
+    let solved = scene.check().unwrap().solve(method, &Device::Cpu, Some(&take), &|_| {}).unwrap();
     (solved.maps, images.into_inner().unwrap())
 }
 
@@ -27,7 +31,7 @@ fn check_definition(recipe: Recipe, change: impl Fn(&mut Scene)) {
     let mut scene = scene(recipe);
     change(&mut scene);
     let (maps, residuals) = with_residuals(&scene, Method::Auto);
-    assert_eq!(maps, solve_scene(&scene, Method::Auto, &|_| {}).unwrap().0, "{recipe:?}");
+    assert_eq!(maps, with_warnings(&scene, Method::Auto).unwrap().0, "{recipe:?}");
     let field = light_field(&scene).unwrap();
     let run = Run::new(&scene, &field, noise(&scene, &field), Method::Auto);
     let mut compared = 0;
@@ -116,18 +120,18 @@ fn what_the_robust_path_drops_is_in_the_residual() {
 fn zeros_are_resampled_and_gaps_are_not() {
     let (width, height) = (40, 30);
     let camera = scene(Recipe { width, height, ..Recipe::default() }).camera.unwrap();
-    let straight = super::super::finish::pinhole(&camera);
+    let straight = crate::solve::output::finish::pinhole(&camera);
     let mut values = Image::filled(width, height, 0.0_f32);
     values.data[12 * width + 20] = 1.0;
     values.data[5 * width + 7] = f32::NAN;
     // Without distortion every pixel stays where it is.
-    let same = super::super::finish::undistort_values(&values, &straight);
+    let same = crate::solve::output::finish::undistort_values(&values, &straight);
     for (at, (found, expected)) in same.data.iter().zip(&values.data).enumerate() {
         let equal = (found - expected).abs() < 1e-6 || found.is_nan() && expected.is_nan();
         assert!(equal, "{at}: {found}, not {expected}");
     }
     // With distortion the bright pixel keeps its weight among zeros: taken for gaps, they would let it spread at full height.
-    let bent = super::super::finish::undistort_values(&values, &camera);
+    let bent = crate::solve::output::finish::undistort_values(&values, &camera);
     let sum: f32 = bent.data.iter().filter(|value| value.is_finite()).sum();
     assert!((0.7..1.3).contains(&sum), "{sum}");
 }

@@ -163,7 +163,8 @@ impl Laboratory {
     fn error_deg(&self, session: &Path, name: &str) -> f64 {
         let out = self.path(name);
         let calibration = self.path("rig/calibration");
-        solve::run(&solve::Options::new(session.to_owned(), calibration, &out), &|_| ()).unwrap();
+        solve::run(&solve::Options::new(session.to_owned(), calibration, &out), &|_| (), None)
+            .unwrap();
         let options = compare::Options {
             a: out.join("normal.exr"),
             b: self.path("rig/truth/normal.exr"),

@@ -10,7 +10,7 @@ use weavelight::photometry::Method;
 use weavelight::raster::read_mask;
 use weavelight::session::{MANIFEST, Session};
 use weavelight::solution::{MASK_INPUT, Report};
-use weavelight::solve::method_of;
+
 use weavelight_calibration::description::Image;
 
 /// Where a solution comes from.
@@ -69,7 +69,7 @@ pub(super) fn capture_of(
     if report.scale != 1 {
         return Err(texts::reduced(report.scale));
     }
-    let method = method_of(report).ok_or_else(|| texts::unknown_method(&report.method))?;
+    let method = report.solved_by().ok_or_else(|| texts::unknown_method(&report.method))?;
     let session = find_session(folder, place, report)?;
     let calibration =
         find_calibration(folder, place, report).ok_or_else(|| texts::NO_CALIBRATION.to_owned())?;

@@ -8,7 +8,7 @@ use crate::widgets::Sign;
 use eframe::egui::{
     self, Color32, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
 };
-use weavelight::solve::{Part, Photosite};
+use weavelight::photometry::{Part, Photosite};
 
 /// Photosites along the loupe's side: odd, so that one is in the middle.
 const SIDE: isize = 11;

@@ -48,7 +48,7 @@ use slopes::Distribution;
 use std::path::PathBuf;
 use std::sync::Arc;
 use view::{MapView, Pyramid};
-use weavelight::solve::Photosite;
+use weavelight::photometry::Photosite;
 use weavelight_calibration::description::Image;
 
 /// What this room asks of the worker.

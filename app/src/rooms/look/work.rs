@@ -13,8 +13,9 @@ use std::sync::Arc;
 use weavelight::files::{FileError, Lock, write_atomic};
 use weavelight::raster::encode_png_grey8;
 use weavelight::report::page_of_solve;
+use weavelight::session::MASK_FILE;
 use weavelight::session::Session;
-use weavelight::solve::{MASK_FILE, Rows, Scene, Shown, SolveError, load_scene, run_with_page};
+use weavelight::solve::{Rows, Scene, Shown, SolveError, run};
 use weavelight_calibration::description::Image;
 
 /// The frames that were looked at last, decoded.
@@ -66,7 +67,7 @@ fn open(path: &Path, tools: &mut Tools, out: &Outbox) {
 }
 
 fn solve_scan(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) {
-    let how = (settings, weavelight::solve::Reuse::IfCurrent);
+    let how = (settings, weavelight::solution::Reuse::IfCurrent);
     if let Some(solved) = crate::rooms::scan::solve(scan, how, tools, out) {
         open_solution(&solved.solution, tools, out);
     }
@@ -177,7 +178,7 @@ fn scene<'t>(
         Some(scene) => scene,
         None => {
             out.tick(0.1, texts::READING_FRAMES);
-            let (scene, _) = load_scene(&sources.session, &sources.calibration)?;
+            let (scene, _) = Scene::load(&sources.session, &sources.calibration)?;
             Box::new(scene)
         }
     };
@@ -231,7 +232,7 @@ fn solve(
     let options = settings.options(session, calibration, solution);
     let solved = out.job(&texts::solving(&name), || {
         let page = |shown: &Shown| page_of_solve(shown, None);
-        run_with_page(&options, &|state| out.tick(state.share(), state.stage.what()), Some(&page))
+        run(&options, &|state| out.tick(state.share(), state.stage.what()), Some(&page))
     });
     if solved.is_ok() {
         open_solution(solution, tools, out);

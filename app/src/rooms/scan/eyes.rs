@@ -14,10 +14,11 @@ use weavelight::device::camera::Settings;
 use weavelight::files::{InputKind, read_input};
 use weavelight::instrument::Calibration;
 use weavelight::linear::Exposure;
+use weavelight::live::Accumulator;
 use weavelight::machine::spawn;
 use weavelight::raw::{Frame, Hint, decode};
 use weavelight::session::Session;
-use weavelight::solve::preview::{Accumulator, Scale};
+use weavelight::solution::Scale;
 use weavelight_calibration::description::{Camera, Plane};
 
 /// A frame that is safe.

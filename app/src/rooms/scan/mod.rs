@@ -33,7 +33,7 @@ use view::View;
 use weavelight::device::camera::Settings;
 use weavelight::device::scan::{Preview, Summary};
 use weavelight::solution::Report;
-use weavelight::solve::Reuse;
+use weavelight::solution::Reuse;
 use weavelight_sim::cloth::Preset;
 
 /// What this room asks of the worker.

@@ -20,7 +20,8 @@ use weavelight::report::{expected_error, page_of_solve};
 use weavelight::session::Session;
 use weavelight::simulate::Scene;
 use weavelight::solution::Report;
-use weavelight::solve::{Reuse, Shown, Solved, run_with_page};
+use weavelight::solution::Reuse;
+use weavelight::solve::{Shown, Solved, run};
 use weavelight_sim::cloth::Preset;
 
 /// How a scan ended that did not fail.
@@ -232,7 +233,7 @@ pub(super) fn solve(
             page_of_solve(shown, None)
         };
         let tell = |state: weavelight::solve::Progress| out.tick(state.share(), state.stage.what());
-        Ok(run_with_page(&options, &tell, Some(&page))?)
+        Ok(run(&options, &tell, Some(&page))?)
     });
     let Solved { report, up_to_date } = solved.ok()?;
     out.warn(&name, &report.warnings);

@@ -18,7 +18,7 @@ use eframe::egui::{
 };
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use weavelight::solve::Reuse;
+use weavelight::solution::Reuse;
 
 /// What this room asks of the worker.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use super::geometry::Geometry;
 use super::pyramid::{Pyramid, Texel};
 use half::f16;
 use std::sync::Arc;
-use weavelight::solve::preview::Preview;
+use weavelight::live::Preview;
 
 /// Maps of one surface, all of one size.
 #[derive(Clone, Debug)]
