@@ -117,7 +117,7 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("files", &["quantity"]),
     ("machine", &["files"]),
     ("raster", &["files", "machine"]),
-    ("raw", &["files", "raster"]),
+    ("raw", &["raster"]),
     ("instrument", &["files", "quantity", "raster", "raw"]),
     ("session", &["files", "instrument", "quantity", "raster", "raw"]),
     ("photometry", &[]),

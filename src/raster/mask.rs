@@ -1,8 +1,9 @@
 //! Masks: one meaning, wherever a picture says what is inside.
 
 use super::PictureError;
+use super::decode::decode_picture;
 use super::error::content_error;
-use super::picture::{Format, Picture, Values, decode_picture};
+use super::picture::{Format, Picture, Values};
 use crate::files::FileError;
 use std::path::Path;
 use weavelight_calibration::description::Image;

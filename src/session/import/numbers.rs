@@ -1,8 +1,8 @@
 //! What pictures say of their numbers, gathered over a set: encoding, primaries, and where samples clip.
 
-use super::Encoding;
 use crate::instrument::Color;
 use crate::raw::{self, Ceiling, Histogram, Numbers, contradictions, mixed_encodings};
+use crate::session::Encoding;
 use nalgebra::Matrix3;
 use std::path::{Path, PathBuf};
 

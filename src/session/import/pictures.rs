@@ -1,10 +1,11 @@
 //! The pictures themselves: what must be known of them to import them.
 
 use super::looks::Look;
-use super::{Encoding, ImportError, Options};
+use super::{ImportError, Options};
 use crate::files::{FileError, sha256_hex};
 use crate::raster;
 use crate::raw::{self, DecodeError, Hint, Histogram, Metadata};
+use crate::session::Encoding;
 use image::{ColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::path::Path;
 

@@ -5,8 +5,10 @@ mod written;
 use super::*;
 use crate::instrument::Calibration;
 use crate::raster::{PngContent, write_png_grey16, write_png_rgb16};
+use crate::session::Encoding;
 use nalgebra::Matrix3;
 use std::fs;
+use weavelight_calibration::description::Cfa;
 
 /// A folder of small pictures `names` (16 bits unless the name begins with an 8) beside a light list.
 struct Set {
