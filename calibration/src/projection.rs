@@ -215,11 +215,6 @@ impl<'a> Projector<'a> {
             .then(|| self.pixel_of_distorted(self.lens.distort(undistorted)))
     }
 
-    /// Pixels of many points.
-    pub fn project_all(&self, points_in_rig_mm: &[Point3<f64>]) -> Vec<Option<[f64; 2]>> {
-        points_in_rig_mm.iter().map(|point| self.project(point)).collect()
-    }
-
     /// The undistorted point (x, y) at z = 1 of the camera frame that a pixel shows; `None` beyond the fold.
     pub fn undistorted(&self, [u, v]: [f64; 2]) -> Option<[f64; 2]> {
         let camera = self.camera;
@@ -246,11 +241,6 @@ impl<'a> Projector<'a> {
     /// The point of a plane that a pixel shows, rig frame, millimetres; `None` where the line of sight misses it.
     pub fn on_plane(&self, pixel: [f64; 2], plane: &Plane) -> Option<Point3<f64>> {
         self.ray(pixel)?.on_plane(plane)
-    }
-
-    /// [`Projector::on_plane`] of many pixels.
-    pub fn all_on_plane(&self, pixels: &[[f64; 2]], plane: &Plane) -> Vec<Option<Point3<f64>>> {
-        pixels.iter().map(|&pixel| self.on_plane(pixel, plane)).collect()
     }
 
     fn pixel_of_distorted(&self, [x, y]: [f64; 2]) -> [f64; 2] {

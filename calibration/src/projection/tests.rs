@@ -59,11 +59,9 @@ fn every_pixel_finds_its_way_back() {
                 .step_by(251)
                 .flat_map(|v| (0..=4927).step_by(379).map(move |u| [f64::from(u), f64::from(v)]))
                 .collect();
-            let points: Vec<_> =
-                projector.all_on_plane(&pixels, &plane).into_iter().map(Option::unwrap).collect();
-            for ((pixel, point), back) in
-                pixels.iter().zip(&points).zip(projector.project_all(&points))
-            {
+            for pixel in &pixels {
+                let point = projector.on_plane(*pixel, &plane).unwrap();
+                let back = projector.project(&point);
                 let off_plane = (point - plane.point_mm).dot(&plane.normal);
                 assert!(off_plane.abs() < 1e-9, "{off_plane} mm off the plane");
                 let back = back.unwrap();

@@ -168,11 +168,6 @@ impl Board {
         std::mem::take(&mut self.shared.lock().interruptions)
     }
 
-    /// Is it there?
-    pub fn is_connected(&self) -> bool {
-        self.shared.lock().connected
-    }
-
     /// Waits until an unplugged board is back.
     pub fn wait_until_connected(&self, timeout: Duration) -> Result<(), BoardError> {
         let state = self.shared.lock();
