@@ -35,7 +35,7 @@ fn commands(help: &str) -> Vec<String> {
 }
 
 #[test]
-fn help() {
+fn help_texts() {
     let top = help_of("");
     for command in commands(&top) {
         let text = help_of(&command);

@@ -108,7 +108,7 @@ impl FileError {
 }
 
 /// Why a file was not read and what to do, to follow its name.
-pub(crate) fn read_advice(source: &io::Error) -> String {
+fn read_advice(source: &io::Error) -> String {
     if let Some(refused) = source.get_ref().and_then(|inner| inner.downcast_ref::<Refused>()) {
         return refused.to_string();
     }

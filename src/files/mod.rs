@@ -29,7 +29,6 @@ pub use atomic::{check_output_folder, clean_temporary, parent_of, write_atomic};
 pub use disk::free_bytes;
 pub use document::Document;
 pub use error::FileError;
-pub(crate) use error::read_advice;
 pub use exchange::exchange;
 pub use file_list::LIST_FILE;
 pub use hash::{sha256_hex, sha256_of_file};
