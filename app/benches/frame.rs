@@ -16,10 +16,17 @@ use eframe::egui_wgpu::{
 };
 use rustix::time::{ClockId, clock_gettime};
 use std::time::{Duration, Instant};
-use weavelight_app::desk::Desk;
-use weavelight_app::rooms::look::view::{Geometry, Maps, install};
-use weavelight_app::rooms::look::{Look, Opened, Told, slopes};
-use weavelight_app::settings::Settings;
+use weavelight_app::jobs::look;
+use weavelight_app::jobs::look::opened::Opened;
+use weavelight_app::jobs::messages::Update;
+use weavelight_app::jobs::state::AppState;
+use weavelight_app::model::settings::Settings;
+use weavelight_app::rooms::RoomPanel;
+use weavelight_app::rooms::look::Look;
+use weavelight_app::viewer::geometry::Geometry;
+use weavelight_app::viewer::gpu::install;
+use weavelight_app::viewer::maps::Maps;
+use weavelight_app::viewer::slopes;
 use weavelight_calibration::description::Plane;
 
 /// The reference camera's frame.
@@ -37,7 +44,7 @@ struct Window {
     state: RenderState,
     target: wgpu::TextureView,
     look: Look,
-    desk: Desk,
+    app: AppState,
     frame: usize,
 }
 
@@ -97,8 +104,8 @@ impl Window {
         let state = render_state();
         install(&ctx, Some(&state));
         let settings = Settings::load_from(std::path::Path::new("none"));
-        weavelight_app::theme::apply(&ctx, &settings);
-        let (mut look, mut desk) = (Look::default(), Desk::new(settings));
+        weavelight_app::ui::theme::apply(&ctx, &settings);
+        let (mut room, mut app) = (Look::default(), AppState::new(settings));
         let opened = Opened {
             name: "weave".to_owned(),
             folder: "weave".into(),
@@ -110,9 +117,9 @@ impl Window {
             frames: Err(String::new()),
             lights: Vec::new(),
         };
-        look.hear(Told::Opened(Box::new(opened)), &mut desk);
+        room.hear(Update::Look(look::Event::Opened(Box::new(opened))), &mut app);
         let target = target(&state);
-        Self { ctx, state, target, look, desk, frame: 0 }
+        Self { ctx, state, target, look: room, app, frame: 0 }
     }
 
     fn renderer(&self) -> String {
@@ -165,8 +172,8 @@ impl Window {
             events,
             ..RawInput::default()
         };
-        let (look, desk) = (&mut self.look, &mut self.desk);
-        let mut output = self.ctx.run_ui(input, |ui| look.ui(ui, desk));
+        let (look, app) = (&mut self.look, &mut self.app);
+        let mut output = self.ctx.run_ui(input, |ui| look.ui(ui, app));
         let shapes = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let screen = ScreenDescriptor { size_in_pixels: WINDOW, pixels_per_point: 1.0 };
         let (device, queue) = (&self.state.device, &self.state.queue);

@@ -1,32 +1,37 @@
 //! The window as a whole: the rooms' rail, the room that is open, what is going on, what went wrong, and the keys.
 
-use crate::desk::{Activity, Area, Brake, Desk, Problem};
-use crate::keeper::Keeper;
-use crate::problems::Problems;
-use crate::questions::{Answer, Question};
-use crate::rooms::{
-    Room, calibrate::Calibrate, look, look::Look, rig::Rig, scan, scan::Scan, scans::Scans,
-    welcome::Welcome,
-};
-use crate::settings::{Settings, Theme};
-use crate::window::Geometry;
-use crate::worker::{Command, Update, Worker};
-use crate::{texts, theme, widgets};
-use eframe::egui::{self, Key, Modifiers, RichText};
+use crate::jobs::messages::{Request, Update};
+use crate::jobs::settings_saver::SettingsSaver;
+use crate::jobs::state::AppState;
+use crate::jobs::worker::Worker;
+use crate::model::activity::Activity;
+use crate::model::problem::{Area, Problem};
+use crate::model::room::Room;
+use crate::model::settings::{Settings, Theme};
+use crate::rooms::RoomPanel;
+use crate::rooms::calibrate::Calibrate;
+use crate::rooms::look::Look;
+use crate::rooms::rig::Rig;
+use crate::rooms::scan::Scan;
+use crate::rooms::scans::Scans;
+use crate::rooms::welcome::Welcome;
+use crate::texts;
+use crate::ui::problems::Problems;
+use crate::ui::questions::{Answer, Question};
+use crate::ui::window::Geometry;
+use crate::ui::{theme, widgets};
+use eframe::egui;
+use eframe::egui::{Key, Modifiers, RichText};
 use eframe::egui_wgpu::RenderState;
 
 /// The window.
 #[derive(Debug)]
 pub struct App {
-    desk: Desk,
+    state: AppState,
     worker: Worker,
-    keeper: Keeper,
+    saver: SettingsSaver,
     welcome: Welcome,
-    rig: Rig,
-    calibrate: Calibrate,
-    scan: Scan,
-    look: Look,
-    scans: Scans,
+    rooms: Vec<(Room, Box<dyn RoomPanel>)>,
     /// The room that was drawn last.
     shown: Option<Room>,
     window: Geometry,
@@ -36,6 +41,17 @@ pub struct App {
     escape_is_taken: bool,
     /// The window may close.
     closes: bool,
+}
+
+/// The rooms in the order of the work. A new room is added here.
+fn rooms() -> Vec<(Room, Box<dyn RoomPanel>)> {
+    vec![
+        (Room::Rig, Box::<Rig>::default()),
+        (Room::Calibrate, Box::<Calibrate>::default()),
+        (Room::Scan, Box::<Scan>::default()),
+        (Room::Look, Box::<Look>::default()),
+        (Room::Scans, Box::<Scans>::default()),
+    ]
 }
 
 /// The window cannot work.
@@ -53,21 +69,16 @@ impl App {
         renderer: Option<&RenderState>,
         settings: Settings,
     ) -> Result<Self, NoThreads> {
-        crate::clock::start();
+        crate::model::clock::start();
         theme::apply(ctx, &settings);
-        look::view::install(ctx, renderer);
+        crate::viewer::gpu::install(ctx, renderer);
         let worker = Worker::start(ctx.clone()).map_err(NoThreads)?;
-        let mut desk = Desk::new(settings.clone());
+        let mut state = AppState::new(settings.clone());
         if let Some(aside) = settings.put_aside() {
-            desk.tell(Problem::warning(texts::SETTINGS, texts::settings_put_aside(aside)));
+            state.report(Problem::warning(texts::SETTINGS, texts::settings_put_aside(aside)));
         }
-        match settings.rig.as_ref() {
-            Some(rig) if rig.exists() => worker.ask(Command::Open(rig.clone())),
-            Some(rig) => {
-                let gone = Problem::warning(texts::rig::OPENING, texts::rig::gone(rig));
-                desk.tell(gone.of(Area::Opening));
-            }
-            None => {}
+        if let Some(rig) = &settings.rig {
+            worker.request(Request::Reopen(rig.clone()));
         }
         Ok(Self {
             window: Geometry::new(&settings),
@@ -75,32 +86,28 @@ impl App {
             question: None,
             escape_is_taken: false,
             closes: false,
-            desk,
+            state,
             worker,
-            keeper: Keeper::start(settings),
+            saver: SettingsSaver::start(settings),
             welcome: Welcome::default(),
-            rig: Rig::default(),
-            calibrate: Calibrate::default(),
-            scan: Scan::default(),
-            look: Look::default(),
-            scans: Scans::default(),
+            rooms: rooms(),
             shown: None,
         })
     }
 
     /// What all rooms share.
-    pub fn desk(&self) -> &Desk {
-        &self.desk
+    pub fn shared(&self) -> &AppState {
+        &self.state
     }
 
     /// The same, to be changed.
-    pub fn desk_mut(&mut self) -> &mut Desk {
-        &mut self.desk
+    pub fn shared_mut(&mut self) -> &mut AppState {
+        &mut self.state
     }
 
-    /// Leaves something to be done, as rooms do.
-    pub fn ask(&mut self, command: Command) {
-        self.desk.ask(command);
+    /// Adds a request to the worker's queue, as rooms do.
+    pub fn request(&mut self, request: Request) {
+        self.state.request(request);
     }
 
     /// What is being asked over everything else.
@@ -110,166 +117,158 @@ impl App {
 
     /// Opens a room.
     pub fn enter(&mut self, room: Room) {
-        self.desk.go_to(room);
+        self.state.go_to(room);
     }
 
     /// Whether nothing is going on and nothing is left to be done.
     pub fn is_idle(&self) -> bool {
-        self.worker.is_idle() && !self.desk.is_busy() && !self.desk.has_asked()
+        self.worker.is_idle() && !self.state.is_busy() && !self.state.has_requests()
     }
 
-    /// Takes in what the worker tells.
+    /// Takes in an update of the worker.
     pub fn hear(&mut self, update: Update) {
-        let desk = &mut self.desk;
+        if let Some(room) = update.room() {
+            if let Some((_, panel)) = self.rooms.iter_mut().find(|(of, _)| *of == room) {
+                panel.hear(update, &mut self.state);
+            }
+            return;
+        }
+        let state = &mut self.state;
         match update {
-            Update::Began(title) => desk.activity = Some(Activity::new(title)),
+            Update::Began(title) => state.activity = Some(Activity::new(title)),
             Update::Progress { share, step, left } => {
-                if let Some(activity) = &mut desk.activity {
+                if let Some(activity) = &mut state.activity {
                     (activity.share, activity.step, activity.left) = (share, step, left);
                 }
             }
             Update::Ended => {
-                desk.activity = None;
-                self.scans.is_stale();
-                self.rig.is_stale();
+                state.activity = None;
+                self.rooms.iter_mut().for_each(|(_, panel)| panel.job_ended());
             }
-            Update::Problem(problem) => desk.tell(problem),
-            Update::GoTo(room) => desk.go_to(room),
-            Update::Opened(place) => {
-                desk.settings.rig = Some(place.folder.clone());
-                desk.place = Some(*place);
-                (desk.held_by, desk.is_calibrated) = (None, false);
-                desk.problems.retain(|problem| problem.area != Some(Area::Opening));
-                self.scan.reset(desk);
-                self.scans.reset(desk);
-                self.rig.reset(desk);
-                self.calibrate.reset();
+            Update::Problem(problem) => state.report(problem),
+            Update::GoTo(room) => state.go_to(room),
+            Update::Opened(project) => {
+                state.settings.rig = Some(project.folder.clone());
+                state.project = Some(*project);
+                (state.held_by, state.is_calibrated) = (None, false);
+                state.problems.retain(|problem| problem.area != Some(Area::Opening));
+                self.rooms.iter_mut().for_each(|(_, panel)| panel.rig_opened(state));
             }
             Update::Held(folder, holder) => self.held(&folder, holder),
-            Update::Calibrated(folder, is) => {
-                if desk.place.as_ref().is_some_and(|place| place.folder == folder) {
-                    desk.is_calibrated = is;
-                }
-            }
-            Update::CalibrationAge(days) => desk.calibration_age_days = days,
-            Update::Rig(told) => self.rig.hear(told, desk),
-            Update::Calibrate(told) => self.calibrate.hear(told, desk),
-            Update::Scan(told) => self.scan.hear(told, desk),
-            Update::Look(told) => self.look.hear(told, desk),
-            Update::Scans(told) => self.scans.hear(told, desk),
+            Update::Calibrated(folder, is) if state.is_open(&folder) => state.is_calibrated = is,
+            Update::CalibrationAge(days) => state.calibration_age_days = days,
+            _ => {}
         }
     }
 
-    /// Another program has taken the rig, or let it go: then what it left is looked at.
+    /// Another program has taken or released the rig. After the release its changes are read.
     fn held(&mut self, folder: &std::path::Path, holder: Option<String>) {
-        let desk = &mut self.desk;
-        if desk.place.as_ref().is_none_or(|place| place.folder != folder) {
+        let state = &mut self.state;
+        if !state.is_open(folder) {
             return;
         }
-        let was_held = desk.held_by.is_some();
-        desk.held_by = holder;
-        if was_held && desk.held_by.is_none() {
-            desk.ask(Command::Scan(scan::Ask::LookForUnfinished));
-            self.scans.is_stale();
-            self.rig.is_stale();
-            self.calibrate.reset();
+        let was_held = state.held_by.is_some();
+        state.held_by = holder;
+        if was_held && state.held_by.is_none() {
+            self.rooms.iter_mut().for_each(|(_, panel)| panel.rig_released(state));
         }
     }
 
     fn hand_over(&mut self) {
-        for brake in self.desk.take_brakes() {
-            match brake {
-                Brake::Cancel => self.worker.brake.cancel(),
-                Brake::Pause => self.worker.brake.pause(),
-                Brake::GoOn => self.worker.brake.go_on(),
-            }
+        for action in self.state.take_actions() {
+            self.worker.control.act(action);
         }
-        for command in self.desk.take_asked() {
-            // What went wrong the last time is told again if it goes wrong again.
-            if let Some(area) = command.tries() {
-                self.desk.forget_errors(area);
+        for request in self.state.take_requests() {
+            // An error of the last try is reported again if it happens again.
+            if let Some(area) = request.tries() {
+                self.state.forget_errors(area);
             }
-            self.worker.ask(command);
+            self.worker.request(request);
         }
     }
 
     fn keep_settings(&mut self) {
-        self.keeper.look_at(&self.desk.settings);
-        match self.keeper.news() {
+        self.saver.update(&self.state.settings);
+        match self.saver.outcome() {
             Some(Err(text)) => {
                 let problem = Problem::error(texts::KEEPING_SETTINGS, text);
-                self.desk.tell(problem.of(Area::Settings));
+                self.state.report(problem.of(Area::Settings));
             }
-            Some(Ok(())) => self.desk.forget_errors(Area::Settings),
+            Some(Ok(())) => self.state.forget_errors(Area::Settings),
             None => {}
         }
     }
 
-    /// What a room does when it is left or entered.
+    /// Tells the rooms which of them is shown.
     fn rooms_change(&mut self) {
-        let open = self.desk.place.as_ref().map(|_| self.desk.settings.room);
+        let open = self.state.project.as_ref().map(|_| self.state.settings.room);
         if open == self.shown {
             return;
         }
-        if self.shown == Some(Room::Rig) {
-            self.rig.leave(&mut self.desk);
+        for (room, panel) in &mut self.rooms {
+            if self.shown == Some(*room) {
+                panel.leave(&mut self.state);
+            }
         }
-        if self.shown == Some(Room::Calibrate) {
-            self.calibrate.leave(&mut self.desk);
-        }
-        if open == Some(Room::Look) {
-            self.look.enter(&mut self.desk);
-        }
-        if open == Some(Room::Scans) {
-            self.scans.is_stale();
+        for (room, panel) in &mut self.rooms {
+            if open == Some(*room) {
+                panel.enter(&mut self.state);
+            }
         }
         self.shown = open;
     }
 
     fn room(&mut self, ui: &mut egui::Ui) {
-        if self.desk.place.is_none() {
-            return self.welcome.ui(ui, &mut self.desk);
+        if self.state.project.is_none() {
+            return self.welcome.ui(ui, &mut self.state);
         }
-        let desk = &mut self.desk;
-        if let Some(holder) = &desk.held_by {
+        let state = &mut self.state;
+        if let Some(holder) = &state.held_by {
             ui.horizontal_top(|ui| {
                 widgets::Sign::Warning.ui(ui);
                 ui.add(egui::Label::new(texts::rig::held(holder)).wrap());
             });
             ui.separator();
         }
-        match desk.settings.room {
-            Room::Rig => self.rig.ui(ui, desk),
-            Room::Calibrate => self.calibrate.ui(ui, desk),
-            Room::Scan => self.scan.ui(ui, desk),
-            Room::Look => self.look.ui(ui, desk),
-            Room::Scans => self.scans.ui(ui, desk),
+        let open = state.settings.room;
+        if let Some((_, panel)) = self.rooms.iter_mut().find(|(room, _)| *room == open) {
+            panel.ui(ui, state);
         }
     }
 
     /// Control and a digit opens a room, Control and Q leaves, Escape ends work where it has nothing else to end; a folder that
     /// is dropped is opened.
     fn keys(&mut self, ctx: &egui::Context) {
-        const DIGITS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
-        for (room, digit) in Room::ALL.into_iter().zip(DIGITS) {
+        const DIGITS: [Key; 9] = [
+            Key::Num1,
+            Key::Num2,
+            Key::Num3,
+            Key::Num4,
+            Key::Num5,
+            Key::Num6,
+            Key::Num7,
+            Key::Num8,
+            Key::Num9,
+        ];
+        for ((room, _), digit) in self.rooms.iter().zip(DIGITS) {
             if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, digit)) {
-                self.desk.go_to(room);
+                self.state.go_to(*room);
             }
         }
         if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Q)) {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
         }
         let escape = ctx.input(|input| input.key_pressed(Key::Escape));
-        if escape && self.desk.is_busy() && !self.escape_is_taken {
-            match self.worker.brake.is_capturing() {
-                // Frames are hours of somebody's work: one key does not end them.
+        if escape && self.state.is_busy() && !self.escape_is_taken {
+            match self.worker.control.is_capturing() {
+                // A scan takes long: one key does not end it.
                 true => self.question = Some(Question::StopScan),
-                false => self.worker.brake.cancel(),
+                false => self.worker.control.cancel(),
             }
         }
         let dropped = ctx.input(|input| input.raw.dropped_files.clone());
         if let Some(path) = dropped.into_iter().next().map(|file| file.path().to_owned()) {
-            self.desk.ask(Command::Dropped(path));
+            self.state.request(Request::Dropped(path));
         }
     }
 
@@ -278,7 +277,7 @@ impl App {
     fn closing(&mut self, ctx: &egui::Context) {
         let wanted = ctx.input(|input| input.viewport().close_requested());
         if wanted && !self.closes && self.question != Some(Question::Ending) {
-            if self.worker.brake.is_capturing() {
+            if self.worker.control.is_capturing() {
                 self.question = Some(Question::QuitWhileScanning);
             } else if self.worker.is_idle() {
                 return;
@@ -295,7 +294,7 @@ impl App {
 
     /// Ends all work; then the window closes.
     fn end(&mut self) {
-        self.worker.brake.close();
+        self.worker.control.close();
         self.question = Some(Question::Ending);
     }
 
@@ -303,7 +302,7 @@ impl App {
     fn put_question(&mut self, ctx: &egui::Context) {
         let about_scan =
             matches!(self.question, Some(Question::StopScan | Question::QuitWhileScanning));
-        if about_scan && !self.worker.brake.is_capturing() {
+        if about_scan && !self.worker.control.is_capturing() {
             self.question = None;
         }
         let Some(question) = self.question.clone() else { return };
@@ -311,7 +310,7 @@ impl App {
             (None, _) => {}
             (Some(Answer::Stay), _) => self.question = None,
             (Some(Answer::Yes), Question::StopScan) => {
-                self.worker.brake.cancel();
+                self.worker.control.cancel();
                 self.question = None;
             }
             (Some(Answer::Yes), _) => self.end(),
@@ -320,16 +319,16 @@ impl App {
 
     fn rail(&mut self, ui: &mut egui::Ui) {
         ui.add_space(theme::GAP);
-        let open = self.desk.settings.room;
+        let open = self.state.settings.room;
         ui.with_layout(egui::Layout::top_down_justified(egui::Align::Min), |ui| {
-            for (k, room) in Room::ALL.into_iter().enumerate() {
-                let text = RichText::new(room.name()).size(15.0);
+            for (k, (room, panel)) in self.rooms.iter().enumerate() {
+                let text = RichText::new(panel.title()).size(15.0);
                 let button =
-                    egui::Button::selectable(room == open, text).min_size(egui::vec2(0.0, 36.0));
-                let enabled = self.desk.place.is_some();
+                    egui::Button::selectable(*room == open, text).min_size(egui::vec2(0.0, 36.0));
+                let enabled = self.state.project.is_some();
                 let hint = format!("Ctrl+{}", k + 1);
                 if ui.add_enabled(enabled, button).on_hover_text(hint).clicked() {
-                    self.desk.go_to(room);
+                    self.state.go_to(*room);
                 }
             }
         });
@@ -337,7 +336,7 @@ impl App {
             widgets::menu(ui, texts::VIEW, |ui| {
                 // A small window has no room for all of it.
                 let room = ui.ctx().content_rect().height() - 60.0;
-                let settings = &mut self.desk.settings;
+                let settings = &mut self.state.settings;
                 egui::ScrollArea::vertical()
                     .max_height(room)
                     .show(ui, |ui| view_menu(ui, settings));
@@ -347,21 +346,21 @@ impl App {
 
     fn status(&mut self, ui: &mut egui::Ui) {
         ui.horizontal_centered(|ui| {
-            self.problems.button(ui, &self.desk.problems);
-            match &self.desk.activity {
+            self.problems.button(ui, &self.state.problems);
+            match &self.state.activity {
                 Some(activity) => {
                     if widgets::activity(ui, activity) {
-                        self.worker.brake.cancel();
+                        self.worker.control.cancel();
                     }
                 }
                 None => {
                     ui.label(RichText::new(texts::READY).weak());
                 }
             }
-            if let Some(place) = &self.desk.place {
+            if let Some(project) = &self.state.project {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let folder = place.folder.display().to_string();
-                    ui.label(RichText::new(&place.rig.name).weak()).on_hover_text(folder);
+                    let folder = project.folder.display().to_string();
+                    ui.label(RichText::new(&project.rig.name).weak()).on_hover_text(folder);
                 });
             }
         });
@@ -406,12 +405,12 @@ impl eframe::App for App {
         egui::Panel::left("rail").exact_size(116.0).resizable(false).show(ui, |ui| self.rail(ui));
         egui::CentralPanel::default().show(ui, |ui| self.room(ui));
         let ctx = ui.ctx().clone();
-        self.problems.ui(&ctx, &mut self.desk.problems);
+        self.problems.ui(&ctx, &mut self.state.problems);
         self.put_question(&ctx);
         widgets::show_focus(&ctx);
-        self.window.follow(&ctx, &mut self.desk.settings);
+        self.window.follow(&ctx, &mut self.state.settings);
         // There may be no frame after this one for a long time.
-        self.keeper.look_at(&self.desk.settings);
+        self.saver.update(&self.state.settings);
         self.escape_is_taken = self.question.is_some()
             || ctx.dragged_id().is_some()
             || egui::Popup::is_any_open(&ctx)
@@ -420,7 +419,7 @@ impl eframe::App for App {
     }
 
     fn on_exit(&mut self) {
-        self.worker.brake.cancel();
+        self.worker.control.cancel();
         self.keep_settings();
     }
 }

@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 use weavelight::files::name_settings;
 use weavelight::machine::{Quiet, correct_environment, start};
-use weavelight_app::{App, settings::Settings, texts};
+use weavelight_app::{App, model::settings::Settings, texts};
 
 fn main() -> ExitCode {
     correct_environment();
-    name_settings(texts::setting);
+    name_settings(texts::settings::name);
     start();
     weavelight::files::survive_size_limits();
     match run() {
@@ -23,10 +23,10 @@ fn main() -> ExitCode {
 fn run() -> eframe::Result {
     let settings = Settings::load();
     let options = eframe::NativeOptions {
-        viewport: weavelight_app::window::builder(&settings)
+        viewport: weavelight_app::ui::window::builder(&settings)
             .with_app_id("weavelight")
             .with_title(texts::TITLE)
-            .with_icon(weavelight_app::theme::icon()),
+            .with_icon(weavelight_app::ui::theme::icon()),
         ..Default::default()
     };
     // The graphics are opened before the window's contents are made.

@@ -9,7 +9,7 @@ fn beside(file: &str) -> std::path::PathBuf {
 /// The icon is drawn by the program; `WEAVELIGHT_ICON=write` writes it anew.
 #[test]
 fn the_icon_is_the_windows() {
-    let icon = weavelight_app::theme::icon();
+    let icon = weavelight_app::ui::theme::icon();
     let file = beside("weavelight.png");
     if std::env::var_os("WEAVELIGHT_ICON").is_some() {
         let picture = image::RgbaImage::from_raw(icon.width, icon.height, icon.rgba.clone());

@@ -10,15 +10,16 @@ mod wizard;
 use desk::{Window, both_themes};
 use eframe::egui;
 use egui_kittest::kittest::Queryable;
-use weavelight_app::rooms::Room;
-use weavelight_app::{settings::Settings, worker::Command};
+use weavelight_app::jobs::messages::Request;
+use weavelight_app::model::room::Room;
+use weavelight_app::model::settings::Settings;
 
 #[test]
 fn a_first_start_offers_a_simulated_rig() {
     let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
     window.harness.run();
     window.click("Try it with a simulated rig");
-    window.until("the rig is open", |app| app.desk().place.is_some());
+    window.until("the rig is open", |app| app.shared().project.is_some());
     assert!(window.home().join("simulated rig/rig.toml").exists());
     assert!(
         !window.home().join("simulated rig/calibration").exists(),
@@ -35,11 +36,11 @@ fn a_folder_without_a_rig_is_told_with_a_remedy() {
     field.type_text("/no/such/rig");
     window.harness.run();
     window.click("Open");
-    window.until("a problem is shown", |app| !app.desk().problems.is_empty());
+    window.until("a problem is shown", |app| !app.shared().problems.is_empty());
     window.harness.run();
     window.click("Dismiss");
     window.harness.run();
-    assert!(window.harness.state().desk().problems.is_empty());
+    assert!(window.harness.state().shared().problems.is_empty());
 }
 
 #[test]
@@ -94,7 +95,7 @@ fn a_scan_that_was_stopped_is_offered_and_continued() {
     window.click("Stop");
     window.until_label("Continue it");
     window.idle();
-    assert!(window.harness.state().desk().problems.is_empty(), "stopping is no fault");
+    assert!(window.harness.state().shared().problems.is_empty(), "stopping is no fault");
     window.click("Continue it");
     window.until_label("Look closer");
 }
@@ -110,7 +111,7 @@ fn a_fault_in_the_middle_is_told_and_the_scan_goes_on_later() {
     let scan = window.rig().join("scans/linen 1");
     let aside = window.rig().join("aside");
     std::fs::rename(&scan, &aside).unwrap();
-    window.until("a problem is shown", |app| !app.desk().problems.is_empty());
+    window.until("a problem is shown", |app| !app.shared().problems.is_empty());
     window.idle();
     std::fs::rename(&aside, &scan).unwrap();
     window.enter(Room::Rig);
@@ -125,8 +126,8 @@ fn a_fault_in_the_middle_is_told_and_the_scan_goes_on_later() {
 fn what_went_wrong_is_shown_with_its_remedy() {
     let gone = |settings: &mut Settings| settings.rig = Some("/no/such/rig".into());
     desk::state("problems", gone, |window| {
-        window.harness.state_mut().ask(Command::Open("/no/such/rig".into()));
-        window.until("both are told", |app| app.desk().problems.len() == 2);
+        window.harness.state_mut().request(Request::Open("/no/such/rig".into()));
+        window.until("both are told", |app| app.shared().problems.len() == 2);
         window.idle();
     });
 }
@@ -221,7 +222,7 @@ fn a_window_begins_where_the_last_one_ended() {
     window.scan_in_the_library("silk 13");
     window.open_small_rig();
     window.enter(Room::Scan);
-    let form = &window.harness.state().desk().settings.scan;
+    let form = &window.harness.state().shared().settings.scan;
     assert_eq!((form.name.as_str(), form.thickness_mm), ("silk 14", 0.4));
     // It is on the disk long before the window closes.
     let file = window.home().join("settings.toml");
@@ -318,9 +319,8 @@ fn the_window_solves_as_the_command_line_does() {
     window.until_label("Look closer");
     let rig = window.rig();
     // As `weavelight solve --settings FILE` makes them.
-    window.harness.state().desk().settings.save().unwrap();
-    let settings =
-        weavelight::settings::Settings::read(&window.home().join("settings.toml")).unwrap();
+    window.harness.state().shared().settings.save().unwrap();
+    let settings = weavelight::solve::Settings::read(&window.home().join("settings.toml")).unwrap();
     let options = settings.options(
         &rig.join("scans/linen 1"),
         &rig.join("calibration"),

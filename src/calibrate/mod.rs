@@ -22,6 +22,7 @@ mod seen;
 mod sheet;
 mod sheet_pose;
 mod status;
+pub mod wizard;
 
 pub use action::{Action, SheetPose};
 pub use camera::{BoardReport, CameraOptions, CameraReport, camera};

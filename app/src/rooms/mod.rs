@@ -1,4 +1,4 @@
-//! The rooms. Each draws itself, keeps what only it needs, asks through the desk, and has its part of the worker beside it.
+//! The rooms. Each draws itself, keeps what only it needs, and leaves its requests in the [`AppState`]. No room uses another.
 
 pub mod calibrate;
 pub mod look;
@@ -7,38 +7,34 @@ pub mod scan;
 pub mod scans;
 pub mod welcome;
 
-use crate::texts::rooms as texts;
-use serde::{Deserialize, Serialize};
+use crate::jobs::messages::Update;
+use crate::jobs::state::AppState;
+use eframe::egui;
+use std::fmt::Debug;
 
-/// A room.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Room {
-    /// The instrument.
-    Rig,
-    /// The wizard.
-    Calibrate,
-    /// The daily work.
-    #[default]
-    Scan,
-    /// Maps under a light.
-    Look,
-    /// What was captured.
-    Scans,
-}
+/// What the window knows of a room.
+pub trait RoomPanel: Debug {
+    /// Its name, as the list of rooms shows it.
+    fn title(&self) -> &'static str;
 
-impl Room {
-    /// In the order of the work.
-    pub const ALL: [Room; 5] = [Room::Rig, Room::Calibrate, Room::Scan, Room::Look, Room::Scans];
+    /// Draws it.
+    fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState);
 
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Room::Rig => texts::RIG,
-            Room::Calibrate => texts::CALIBRATE,
-            Room::Scan => texts::SCAN,
-            Room::Look => texts::LOOK,
-            Room::Scans => texts::SCANS,
-        }
-    }
+    /// An update for this room has come.
+    fn hear(&mut self, update: Update, app: &mut AppState);
+
+    /// The room is shown from now on.
+    fn enter(&mut self, _app: &mut AppState) {}
+
+    /// Another room is shown from now on.
+    fn leave(&mut self, _app: &mut AppState) {}
+
+    /// Another rig was opened: forget the last one.
+    fn rig_opened(&mut self, _app: &mut AppState) {}
+
+    /// Another program has released the rig and may have changed it.
+    fn rig_released(&mut self, _app: &mut AppState) {}
+
+    /// A job has ended: what is on the disk may have changed.
+    fn job_ended(&mut self) {}
 }

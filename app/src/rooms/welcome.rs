@@ -1,11 +1,13 @@
 //! Where there is no rig yet: one way to try it, one way to open one's own.
 
-use crate::browse::Browse;
-use crate::desk::Desk;
+use crate::jobs::messages::Request;
+use crate::jobs::state::AppState;
+use crate::model::paths;
 use crate::texts::welcome as texts;
-use crate::worker::Command;
-use crate::{paths, theme, widgets};
-use eframe::egui::{self, RichText};
+use crate::ui::browse::Browse;
+use crate::ui::{theme, widgets};
+use eframe::egui;
+use eframe::egui::RichText;
 
 /// Of the two cards, points.
 const WIDTH: f32 = 560.0;
@@ -19,13 +21,13 @@ pub struct Welcome {
 
 impl Welcome {
     /// Draws it in the middle of what there is.
-    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    pub fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let above = (ui.available_height() * 0.18).max(theme::WIDE_GAP);
         // Where the window is small and something went wrong, there is not room for all.
-        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.cards(ui, above, desk));
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.cards(ui, above, app));
     }
 
-    fn cards(&mut self, ui: &mut egui::Ui, above: f32, desk: &mut Desk) {
+    fn cards(&mut self, ui: &mut egui::Ui, above: f32, app: &mut AppState) {
         ui.vertical_centered(|ui| {
             ui.add_space(above);
             ui.label(RichText::new(texts::HEADING).size(28.0).strong());
@@ -37,14 +39,14 @@ impl Welcome {
             ui.add_space(side);
             ui.vertical(|ui| {
                 ui.set_max_width(WIDTH.min(ui.available_width()));
-                card(ui, |ui| try_it(ui, desk));
+                card(ui, |ui| try_it(ui, app));
                 ui.add_space(theme::GAP);
-                card(ui, |ui| self.open(ui, desk));
+                card(ui, |ui| self.open(ui, app));
             });
         });
     }
 
-    fn open(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn open(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         ui.label(RichText::new(texts::OPEN).strong());
         ui.label(texts::OPEN_WHAT);
         ui.horizontal(|ui| {
@@ -59,15 +61,15 @@ impl Welcome {
             let open = egui::Button::new(texts::OPEN_IT);
             let clicked = ui.add_enabled(folder.is_some(), open).clicked();
             if let Some(folder) = folder.filter(|_| clicked || entered) {
-                desk.ask(Command::Open(folder));
+                app.request(Request::Open(folder));
             }
         });
     }
 }
 
-fn try_it(ui: &mut egui::Ui, desk: &mut Desk) {
+fn try_it(ui: &mut egui::Ui, app: &mut AppState) {
     if widgets::primary(ui, texts::TRY, egui::vec2(320.0, theme::BIG), true).clicked() {
-        desk.ask(Command::MakeSimulatedRig(desk.settings.home.join(texts::SIMULATED)));
+        app.request(Request::MakeSimulatedRig(app.settings.home.join(texts::SIMULATED)));
     }
     ui.label(texts::TRY_WHAT);
 }

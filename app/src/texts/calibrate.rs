@@ -1,6 +1,6 @@
 //! The Calibrate room.
 
-use crate::rooms::calibrate::{BOARDS, Entry, Kept, Pose, State, Step, Task};
+use weavelight::calibrate::wizard::{BOARDS, Entry, Kept, Pose, State, Step, Task};
 use weavelight::calibrate::{Action, SeenSheet};
 
 /// The button that takes the pictures of a task.
@@ -408,7 +408,7 @@ pub fn entry(entry: &Entry) -> String {
     let stamp = &entry.stamp;
     let when = jiff::civil::DateTime::strptime("%Y-%m-%dT%H%M", stamp)
         .and_then(|when| when.to_zoned(jiff::tz::TimeZone::UTC))
-        .map_or_else(|_| stamp.clone(), |when| crate::clock::local(when.timestamp()));
+        .map_or_else(|_| stamp.clone(), |when| crate::model::clock::local(when.timestamp()));
     match entry.kept {
         Kept::Calibration => when,
         Kept::Pictures(of) => format!("{}: pictures only\n{when}", step(of)),

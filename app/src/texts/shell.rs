@@ -1,6 +1,6 @@
 //! Words of what all rooms share: questions, fields, dialogues, problems.
 
-use crate::number::{Unit, Unreadable};
+use crate::model::number::{Unit, Unreadable};
 use std::ops::RangeInclusive;
 
 /// What is asked before something ends: heading, text, the button that goes on as before, the one that does not.

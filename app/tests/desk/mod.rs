@@ -8,7 +8,10 @@ pub(crate) use names::check_names;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use weavelight::simulate;
-use weavelight_app::{App, rooms::Room, settings::Settings, worker::Command};
+use weavelight_app::App;
+use weavelight_app::jobs::messages::Request;
+use weavelight_app::model::room::Room;
+use weavelight_app::model::settings::Settings;
 
 /// The size that most have.
 pub(crate) const WIDE: [f32; 2] = [1280.0, 800.0];
@@ -35,8 +38,8 @@ impl Window {
         let mut settings = Settings::load_from(&home.path().join("settings.toml"));
         settings.home = home.path().to_owned();
         settings.theme = match theme {
-            egui::Theme::Dark => weavelight_app::settings::Theme::Dark,
-            egui::Theme::Light => weavelight_app::settings::Theme::Light,
+            egui::Theme::Dark => weavelight_app::model::settings::Theme::Dark,
+            egui::Theme::Light => weavelight_app::model::settings::Theme::Light,
         };
         change(&mut settings);
         let quiet = weavelight::machine::Quiet::begin();
@@ -73,8 +76,8 @@ impl Window {
             };
             simulate::run(&options, &|_, _| ()).unwrap();
         }
-        self.harness.state_mut().ask(Command::Open(rig));
-        self.until("the rig is open", |app| app.desk().place.is_some());
+        self.harness.state_mut().request(Request::Open(rig));
+        self.until("the rig is open", |app| app.shared().project.is_some());
         self.idle();
     }
 
@@ -134,7 +137,7 @@ impl Window {
             if news != heard {
                 (heard, since) = (news, Instant::now());
             }
-            let desk = self.harness.state().desk();
+            let desk = self.harness.state().shared();
             assert!(since.elapsed() < PATIENCE, "{what}: not yet; {desk:?}");
             self.wait();
         }
@@ -142,7 +145,7 @@ impl Window {
 
     /// What is known of the work under way.
     fn news(&self) -> Option<(String, String, f64)> {
-        let activity = self.harness.state().desk().activity.as_ref()?;
+        let activity = self.harness.state().shared().activity.as_ref()?;
         Some((activity.title.clone(), activity.step.clone(), activity.share))
     }
 

@@ -1,7 +1,10 @@
 //! A view and nothing else.
 
 use eframe::egui;
-use weavelight_app::rooms::look::view::{Appearance, Canvas, MapView, Maps};
+use weavelight_app::viewer::appearance::Appearance;
+use weavelight_app::viewer::canvas::Canvas;
+use weavelight_app::viewer::map_view::MapView;
+use weavelight_app::viewer::maps::Maps;
 
 /// The view.
 pub(crate) struct Bare {

@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 use weavelight::photometry::Method;
 use weavelight::simulate::{self, Part};
 use weavelight::solve;
-use weavelight_app::rooms::Room;
-use weavelight_app::{App, settings::Settings};
+use weavelight_app::App;
+use weavelight_app::model::room::Room;
+use weavelight_app::model::settings::Settings;
 
 /// The window.
 pub(crate) type Window = Harness<'static, App>;
@@ -104,8 +105,8 @@ impl Bench {
         settings.rig = Some(self.rig());
         settings.room = Room::Look;
         settings.theme = match theme {
-            egui::Theme::Dark => weavelight_app::settings::Theme::Dark,
-            egui::Theme::Light => weavelight_app::settings::Theme::Light,
+            egui::Theme::Dark => weavelight_app::model::settings::Theme::Dark,
+            egui::Theme::Light => weavelight_app::model::settings::Theme::Light,
         };
         let builder = Harness::builder().with_size(size).with_theme(theme).with_max_steps(64);
         let quiet = weavelight::machine::Quiet::begin();
@@ -114,7 +115,7 @@ impl Bench {
             App::new(&cc.egui_ctx, renderer, settings).unwrap()
         });
         drop(quiet);
-        wait(&mut window, "the rig", |window| window.state().desk().place.is_some());
+        wait(&mut window, "the rig", |window| window.state().shared().project.is_some());
         window.run();
         window
     }
@@ -184,7 +185,7 @@ pub(crate) fn drag(window: &mut Window, [from, to]: [egui::Pos2; 2]) {
 pub(crate) fn wait(window: &mut Window, what: &str, mut there: impl FnMut(&Window) -> bool) {
     let patience = Instant::now() + Duration::from_secs(20);
     while !there(window) {
-        assert!(Instant::now() < patience, "{what} did not come: {:?}", window.state().desk());
+        assert!(Instant::now() < patience, "{what} did not come: {:?}", window.state().shared());
         std::thread::sleep(Duration::from_millis(10));
         window.step();
     }

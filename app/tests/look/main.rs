@@ -356,7 +356,7 @@ fn what_is_no_solution_is_told_with_its_remedy() {
     let truth = bench.scan().ancestors().nth(2).unwrap().join("truth");
     bench::enter_folder(&mut window, &truth);
     window.get_by_label("Open").click();
-    bench::wait(&mut window, "a problem", |window| !window.state().desk().problems.is_empty());
+    bench::wait(&mut window, "a problem", |window| !window.state().shared().problems.is_empty());
     window.run();
     window.get_by_label_contains("report.json");
     assert!(window.query_by_label(SOLUTION).is_none());

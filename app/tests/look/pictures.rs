@@ -121,7 +121,7 @@ fn no_graphics_to_draw_with() {
 }
 
 fn wait_for_problem(window: &mut bench::Window, text: &str) {
-    bench::wait(window, "a problem", |window| !window.state().desk().problems.is_empty());
+    bench::wait(window, "a problem", |window| !window.state().shared().problems.is_empty());
     window.run();
     window.get_by_label_contains(text);
 }

@@ -4,9 +4,17 @@ use super::bare::Bare;
 use eframe::egui;
 use egui_kittest::Harness;
 use nalgebra::{Point3, UnitVector3, Vector3};
-use weavelight_app::rooms::look::view::{
-    Appearance, Geometry, MapView, Maps, Mode, Viewport, install, scales, shade, sun, surface,
-};
+use weavelight_app::viewer::appearance::Appearance;
+use weavelight_app::viewer::appearance::Mode;
+use weavelight_app::viewer::appearance::sun;
+use weavelight_app::viewer::geometry::Geometry;
+use weavelight_app::viewer::gpu::install;
+use weavelight_app::viewer::map_view::MapView;
+use weavelight_app::viewer::maps::Maps;
+use weavelight_app::viewer::maps::surface;
+use weavelight_app::viewer::scales;
+use weavelight_app::viewer::shade;
+use weavelight_app::viewer::viewport::Viewport;
 use weavelight_calibration::description::{Camera, Light, Plane, PointLight};
 
 /// The screen has 8 bits, the maps half precision: one step for each.

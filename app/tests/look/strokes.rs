@@ -5,7 +5,7 @@ use super::{CLOTH, SIZE};
 use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use std::path::Path;
-use weavelight_app::rooms::Room;
+use weavelight_app::model::room::Room;
 
 fn savable(window: &bench::Window) -> bool {
     let button = window.query_by_label("Save and solve again");
@@ -97,7 +97,7 @@ fn strokes_outlive_the_window_until_they_are_saved() {
     let mut window = bench.look(SIZE, egui::Theme::Dark);
     settle(&mut window);
     assert!(savable(&window));
-    assert!(window.state().desk().problems.iter().any(|it| it.text.contains("are back")));
+    assert!(window.state().shared().problems.iter().any(|it| it.text.contains("are back")));
     // One step, which can be undone and redone.
     window.get_by_label("Undo").click();
     window.run();
@@ -128,7 +128,7 @@ fn a_picture_that_is_not_the_scans_mask_stays() {
     assert_eq!(read("mask.png"), b"a picture of mine");
     let manifest = String::from_utf8(read("session.toml")).unwrap();
     assert!(manifest.contains("mask = \"mask-2.png\""), "{manifest}");
-    assert!(window.state().desk().problems.is_empty());
+    assert!(window.state().shared().problems.is_empty());
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn a_scan_is_opened_as_its_newest_solution_or_offered_to_be_solved() {
         window.query_all_by_label(SOLUTION).next().is_some()
     });
     assert!(bench.solution().join("normal.exr").exists());
-    let problems = &window.state().desk().problems;
+    let problems = &window.state().shared().problems;
     let about = |text: &str| text.contains("The albedo is as it appears");
     assert!(problems.iter().all(|problem| about(&problem.text)), "{problems:?}");
 }
@@ -164,7 +164,7 @@ fn folders_that_are_something_else_are_told_or_used() {
         bench::enter_folder(&mut window, path);
         window.get_by_label("Open").click();
         settle(&mut window);
-        let desk = window.state().desk();
+        let desk = window.state().shared();
         match expected {
             Ok(room) => assert_eq!((desk.settings.room, desk.problems.len()), (room, 0)),
             Err(text) => {

@@ -2,9 +2,14 @@
 
 use super::bare::Bare;
 use egui_kittest::Harness;
-use weavelight_app::rooms::look::view::{
-    Appearance, Geometry, MapView, Maps, Mode, Viewport, install, shade,
-};
+use weavelight_app::viewer::appearance::Appearance;
+use weavelight_app::viewer::appearance::Mode;
+use weavelight_app::viewer::geometry::Geometry;
+use weavelight_app::viewer::gpu::install;
+use weavelight_app::viewer::map_view::MapView;
+use weavelight_app::viewer::maps::Maps;
+use weavelight_app::viewer::shade;
+use weavelight_app::viewer::viewport::Viewport;
 use weavelight_calibration::description::Plane;
 
 /// Pixels of the cloth: 24 tiles, and as many of the albedo.

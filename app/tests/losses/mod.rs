@@ -4,8 +4,8 @@ use super::desk::{self, Window};
 use eframe::egui::{self, Key, Modifiers, accesskit::Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use std::path::{Path, PathBuf};
-use weavelight_app::rooms::Room;
-use weavelight_app::settings::Settings;
+use weavelight_app::model::room::Room;
+use weavelight_app::model::settings::Settings;
 
 fn window() -> Window {
     let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
@@ -60,7 +60,7 @@ fn scan_again_is_about_the_scan_that_is_shown_and_undone_as_a_whole() {
     let first = identity(&rig, "linen 1");
     // The name of the next swatch is written already.
     type_into(&mut window, "Name", "23");
-    assert_eq!(window.harness.state().desk().settings.scan.name, "linen 123");
+    assert_eq!(window.harness.state().shared().settings.scan.name, "linen 123");
     scan(&mut window, "Scan again");
     let second = identity(&rig, "linen 1");
     assert!(first[0] != second[0], "it was taken again");
@@ -74,7 +74,7 @@ fn scan_again_is_about_the_scan_that_is_shown_and_undone_as_a_whole() {
         window.until_label("Light 9, taken");
     }
     // So small a picture has no reflectance, which its report says.
-    let problems = &window.harness.state().desk().problems;
+    let problems = &window.harness.state().shared().problems;
     let about = |text: &str| text.contains("The albedo is as it appears");
     assert!(problems.iter().all(|problem| about(&problem.text)), "{problems:?}");
     empty_the_bin(&window.home());
@@ -128,7 +128,7 @@ fn an_export_never_takes_the_place_of_anything() {
         match expected {
             Ok(made) => assert!(made.join("normal.exr").exists(), "{}", made.display()),
             Err(text) => {
-                let problems = &window.harness.state().desk().problems;
+                let problems = &window.harness.state().shared().problems;
                 assert!(problems.iter().any(|it| it.text.contains(text)), "{problems:?}");
             }
         }
@@ -162,7 +162,7 @@ fn what_the_search_hides_is_not_acted_on() {
     window.harness.key_press(Key::Enter);
     window.harness.run();
     window.until_label("Delete “silk 12”");
-    assert_eq!(window.harness.state().desk().settings.room, Room::Scans, "nothing is opened");
+    assert_eq!(window.harness.state().shared().settings.room, Room::Scans, "nothing is opened");
     window.harness.key_press(Key::Delete);
     window.harness.run();
     window.idle();
@@ -272,10 +272,13 @@ fn whatever_is_dropped_is_used_for_what_it_is() {
     let rig = window.rig();
     let drop_on = |window: &mut Window, path: &Path, expected: Result<Room, &str>| {
         window.enter(Room::Rig);
-        window.harness.state_mut().ask(weavelight_app::worker::Command::Dropped(path.to_owned()));
+        window
+            .harness
+            .state_mut()
+            .request(weavelight_app::jobs::messages::Request::Dropped(path.to_owned()));
         window.idle();
         window.idle();
-        let desk = window.harness.state().desk();
+        let desk = window.harness.state().shared();
         match expected {
             Ok(room) => assert_eq!(desk.settings.room, room, "{}", path.display()),
             Err(text) => {
@@ -326,7 +329,7 @@ fn a_rig_that_another_program_holds_is_looked_at_until_it_is_free() {
     let mut window = window();
     window.scan_in_the_library("silk 12");
     let lock = held_by_another(&window.rig().join(".rig.toml.weavelight-lock"));
-    window.until("it is held", |app| app.desk().held_by.is_some());
+    window.until("it is held", |app| app.shared().held_by.is_some());
     window.enter(Room::Scan);
     window.harness.get_by_label_contains("in use by weavelight 0.1.0 (rig, process 1)");
     let disabled = |window: &Window, label: &str| {
@@ -341,7 +344,7 @@ fn a_rig_that_another_program_holds_is_looked_at_until_it_is_free() {
     window.idle();
     assert!(window.rig().join("scans/silk 12").exists());
     drop(lock);
-    window.until("it is free", |app| app.desk().held_by.is_none());
+    window.until("it is free", |app| app.shared().held_by.is_none());
     scan(&mut window, "Scan the swatch");
     assert!(window.rig().join("solutions/linen 1/normal.exr").exists());
 }
@@ -356,7 +359,7 @@ fn a_scan_that_another_program_takes_is_not_deleted() {
     window.click("silk 12, not solved yet");
     window.click("Delete “silk 12”");
     window.idle();
-    let problems = &window.harness.state().desk().problems;
+    let problems = &window.harness.state().shared().problems;
     assert!(problems.iter().any(|it| it.text.contains("is in use by weavelight")), "{problems:?}");
     assert!(folder.join("session.toml").exists());
     drop(lock);

@@ -7,9 +7,10 @@ use eframe::egui::emath::Numeric;
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use weavelight_app::number::{Number, Unit};
-use weavelight_app::rooms::Room;
-use weavelight_app::widgets;
+use weavelight_app::model::number::Unit;
+use weavelight_app::model::room::Room;
+use weavelight_app::ui::number::Number;
+use weavelight_app::ui::widgets;
 
 /// Writes into a number's field, over what stands there.
 fn write<S>(window: &mut Harness<'_, S>, label: &str, text: &str) {
@@ -32,7 +33,7 @@ fn enter(window: &mut Window) {
 }
 
 fn thickness(window: &Window) -> f64 {
-    window.harness.state().desk().settings.scan.thickness_mm
+    window.harness.state().shared().settings.scan.thickness_mm
 }
 
 fn can_scan(window: &Window) -> bool {
@@ -78,7 +79,7 @@ fn what_is_no_length_stays_and_is_said() {
     // Space does not get past it, either.
     window.harness.key_press(Key::Space);
     window.harness.step();
-    assert!(!window.harness.state().desk().is_busy());
+    assert!(!window.harness.state().shared().is_busy());
     write(&mut window.harness, "Thickness", "500 mm");
     enter(&mut window);
     window.harness.get_by_label_contains("Out of range: 0 to 100 mm");
@@ -183,15 +184,15 @@ fn exposures_are_fractions_too() {
     window.harness.run();
     write(&mut window.harness, "Exposure", "1/8 s");
     enter(&mut window);
-    assert_eq!(window.harness.state().desk().settings.scan.exposure_s, 0.125);
+    assert_eq!(window.harness.state().shared().settings.scan.exposure_s, 0.125);
     // A field that was only visited keeps the digits that it does not show.
     write(&mut window.harness, "Exposure", "1/60");
     enter(&mut window);
-    let before = window.harness.state().desk().settings.scan.exposure_s;
+    let before = window.harness.state().shared().settings.scan.exposure_s;
     window.harness.get_by_role_and_label(Role::SpinButton, "Exposure").click();
     window.harness.run();
     enter(&mut window);
-    assert_eq!(window.harness.state().desk().settings.scan.exposure_s, before);
+    assert_eq!(window.harness.state().shared().settings.scan.exposure_s, before);
     // An exposure that is not used does not stand in the way.
     write(&mut window.harness, "Exposure", "long");
     enter(&mut window);
@@ -215,8 +216,8 @@ fn enter_opens_the_path_that_was_written() {
     window.harness.event(eframe::egui::Event::Paste(uri));
     window.harness.step();
     window.harness.key_press(Key::Enter);
-    window.until("it is open", |app| app.desk().place.is_some());
-    assert_eq!(window.harness.state().desk().place.as_ref().unwrap().folder, rig);
+    window.until("it is open", |app| app.shared().project.is_some());
+    assert_eq!(window.harness.state().shared().project.as_ref().unwrap().folder, rig);
 }
 
 #[test]
@@ -239,7 +240,7 @@ fn enter_exports_to_the_path_that_was_written() {
     window.idle();
     assert!(to.join("normal.exr").exists());
     // The same key has not opened the scan.
-    assert_eq!(window.harness.state().desk().settings.room, Room::Scans);
+    assert_eq!(window.harness.state().shared().settings.room, Room::Scans);
 }
 
 /// The chart's field, too: each of them is this one.

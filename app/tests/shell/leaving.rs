@@ -4,8 +4,8 @@ use super::{desk, window};
 use crate::desk::Window;
 use eframe::egui::{self, Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::kittest::Queryable;
-use weavelight_app::questions::Question;
-use weavelight_app::rooms::Room;
+use weavelight_app::model::room::Room;
+use weavelight_app::ui::questions::Question;
 
 /// A scan under way.
 fn scanning() -> Window {
@@ -56,7 +56,7 @@ fn escape_leaves_a_field_before_it_asks_about_the_scan() {
     assert_eq!(question(&window), Some(&Question::StopScan));
     escape(&mut window);
     assert_eq!(question(&window), None, "Escape is no");
-    assert!(window.harness.state().desk().is_busy(), "the scan goes on");
+    assert!(window.harness.state().shared().is_busy(), "the scan goes on");
     escape(&mut window);
     window.click("Stop the scan");
     window.until("it is stopped", |app| app.is_idle());
@@ -103,7 +103,7 @@ fn closing_asks_while_it_scans_and_stops_the_scan_first() {
     window.click("Keep scanning");
     window.harness.step();
     assert_eq!(question(&window), None);
-    assert!(window.harness.state().desk().is_busy());
+    assert!(window.harness.state().shared().is_busy());
     assert!(close(&mut window).contains(&ViewportCommand::CancelClose));
     window.click("Stop and quit");
     let begun = std::time::Instant::now();

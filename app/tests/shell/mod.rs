@@ -7,9 +7,10 @@ mod tabs;
 use super::desk::{self, Window};
 use eframe::egui::{self, Key, Rect};
 use egui_kittest::kittest::Queryable;
-use weavelight_app::desk::Problem;
-use weavelight_app::rooms::Room;
-use weavelight_app::worker::{Command, Update};
+use weavelight_app::jobs::messages::Request;
+use weavelight_app::jobs::messages::Update;
+use weavelight_app::model::problem::Problem;
+use weavelight_app::model::room::Room;
 
 fn window() -> Window {
     let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
@@ -61,7 +62,7 @@ fn a_problem_moves_nothing_and_can_be_read() {
         modifiers: egui::Modifiers::NONE,
     });
     window.harness.step();
-    let text = &window.harness.state().desk().problems.last().unwrap().text;
+    let text = &window.harness.state().shared().problems.last().unwrap().text;
     let expected = format!("Scan failed: {text}");
     let copied = &window.harness.output().platform_output.commands;
     assert!(
@@ -87,11 +88,11 @@ fn a_problem_moves_nothing_and_can_be_read() {
 fn an_error_goes_with_its_cause() {
     let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
     window.harness.run();
-    window.harness.state_mut().ask(Command::Open("/no/such/rig".into()));
-    window.until("it is told", |app| app.desk().problems.len() == 1);
+    window.harness.state_mut().request(Request::Open("/no/such/rig".into()));
+    window.until("it is told", |app| app.shared().problems.len() == 1);
     window.harness.state_mut().hear(Update::Problem(Problem::error("Scan", "of another kind")));
     window.open_small_rig();
-    let problems = &window.harness.state().desk().problems;
+    let problems = &window.harness.state().shared().problems;
     let titles: Vec<_> = problems.iter().map(|problem| problem.title.as_str()).collect();
     assert_eq!(titles, ["Scan"]);
 }
@@ -114,7 +115,7 @@ fn what_has_the_keyboard_is_seen() {
 
 /// Presses Tab until it comes back to where it began; each stop has its ring.
 fn stops(window: &mut Window, theme: egui::Theme) -> Vec<Rect> {
-    let color = weavelight_app::theme::focus(theme);
+    let color = weavelight_app::ui::theme::focus(theme);
     let mut stops: Vec<Rect> = Vec::new();
     for _ in 0..80 {
         window.harness.key_press(Key::Tab);
@@ -179,7 +180,7 @@ fn a_held_space_bar_scans_once() {
         window.harness.step();
     };
     press(&mut window, false);
-    window.until("it scans", |app| app.desk().is_busy());
+    window.until("it scans", |app| app.shared().is_busy());
     window.until("it is done", |app| app.is_idle());
     for _ in 0..20 {
         press(&mut window, true);
@@ -209,13 +210,13 @@ fn names_of_every_script_are_drawn() {
         &"\u{fdfd}".repeat(300),
     ] {
         let form = window.harness.state_mut();
-        form.desk_mut().settings.scan.name = name.to_owned();
+        form.shared_mut().settings.scan.name = name.to_owned();
         window.enter(Room::Scan);
         window.harness.run();
         window.harness.state_mut().hear(Update::Problem(Problem::warning(name, name)));
         window.harness.run();
     }
-    assert_eq!(window.harness.state().desk().problems.len(), 12);
+    assert_eq!(window.harness.state().shared().problems.len(), 12);
 }
 
 /// The list of maps shows all nine at once.

@@ -5,7 +5,7 @@ use crate::desk::Window;
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Key, Pos2, Rect};
 use egui_kittest::kittest::Queryable;
-use weavelight_app::rooms::Room;
+use weavelight_app::model::room::Room;
 
 /// Presses Tab; what has the keyboard then.
 fn tab(window: &mut Window) -> Option<Rect> {

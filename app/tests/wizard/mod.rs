@@ -16,9 +16,10 @@ use egui_kittest::SnapshotResults;
 use egui_kittest::kittest::NodeT;
 use egui_kittest::kittest::Queryable;
 use weavelight::simulate;
+use weavelight_app::jobs::messages::Request;
 #[cfg(feature = "opencv")]
-use weavelight_app::desk::Severity;
-use weavelight_app::{rooms::Room, worker::Command};
+use weavelight_app::model::problem::Severity;
+use weavelight_app::model::room::Room;
 
 /// As small as a chessboard's corners allow.
 const FRAME: [usize; 2] = [410, 272];
@@ -40,8 +41,8 @@ fn make_uncalibrated(window: &mut Window, frame: [usize; 2]) {
     options.flaws.ruler_error_mm = 8.0;
     options.flaws.vignetting = 0.2;
     simulate::write_rig(&options).unwrap();
-    window.harness.state_mut().ask(Command::Open(options.out));
-    window.until("the rig is open", |app| app.desk().place.is_some());
+    window.harness.state_mut().request(Request::Open(options.out));
+    window.until("the rig is open", |app| app.shared().project.is_some());
     window.idle();
     window.enter(Room::Calibrate);
     window.idle();
@@ -88,7 +89,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     // Live: the board is drawn over the picture as it is moved about, again and again, and nothing is kept.
     window.click("Live");
     window.until_label("The board is found: 54 corners.");
-    window.until("it looks again", |app| app.desk().is_busy());
+    window.until("it looks again", |app| app.shared().is_busy());
     window.click("Live");
     window.idle();
     assert!(!window.rig().join("targets").exists());
@@ -123,7 +124,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     window.until_label("Tilt the white sheet once more, to check");
     window.until_label("The rig is calibrated");
     window.idle();
-    let problems = &window.harness.state().desk().problems;
+    let problems = &window.harness.state().shared().problems;
     let failed = problems.iter().any(|problem| problem.severity == Severity::Error);
     assert!(!failed, "{problems:?}");
     looks(&mut window, "calibrate-done", &mut results);
@@ -165,8 +166,8 @@ fn the_wizard_goes_to_a_finished_calibration() {
 fn the_first_calibration_takes_two_minutes() {
     let mut window = Window::new(desk::WIDE, egui::Theme::Dark);
     let folder = window.home().join("first");
-    window.harness.state_mut().ask(Command::MakeSimulatedRig(folder));
-    window.until("the rig is open", |app| app.desk().place.is_some());
+    window.harness.state_mut().request(Request::MakeSimulatedRig(folder));
+    window.until("the rig is open", |app| app.shared().project.is_some());
     window.enter(Room::Calibrate);
     window.idle();
     let begun = std::time::Instant::now();

@@ -4,15 +4,18 @@ use super::uncalibrated;
 use crate::desk::{self, Window};
 use eframe::egui;
 use egui_kittest::kittest::{NodeT, Queryable};
+use weavelight::calibrate::wizard::State;
 use weavelight::calibrate::{BoardsSoFar, status};
 use weavelight::device::board::{BoardError, PortChoice};
 use weavelight::device::camera::CameraError;
 use weavelight::device::scan::CameraFinding;
 use weavelight::doctor::{LightBoard, examine_boards};
-use weavelight_app::desk::Problem;
-use weavelight_app::rooms::calibrate::{State, Told};
-use weavelight_app::rooms::{Room, rig};
-use weavelight_app::worker::{Ended, Update};
+use weavelight_app::jobs::calibrate::Event;
+use weavelight_app::jobs::messages::Update;
+use weavelight_app::jobs::rig;
+use weavelight_app::model::activity::Ended;
+use weavelight_app::model::problem::Problem;
+use weavelight_app::model::room::Room;
 
 impl Window {
     fn hear(&mut self, update: Update) {
@@ -82,7 +85,7 @@ fn a_camera_that_was_unplugged_is_told_in_the_room_and_in_the_panel() {
         |window| {
             super::make_uncalibrated(window, super::FRAME);
             window.hear(Update::Problem(Problem::error("Photographing the chessboard", &text)));
-            window.hear(Update::Calibrate(Told::Halted(Ended::Failed)));
+            window.hear(Update::Calibrate(Event::Halted(Ended::Failed)));
             window.idle();
             assert_eq!(window.says(&text), 2);
         },
@@ -104,13 +107,13 @@ fn what_went_wrong_stays_until_the_next_try() {
         window.says("the watched folder"),
         2,
         "{:?}",
-        window.harness.state().desk().problems
+        window.harness.state().shared().problems
     );
     window.click("Dismiss");
     window.idle();
     assert_eq!(window.says("the watched folder"), 1, "the room still says what is to be done");
     // Stopped is no fault.
-    window.hear(Update::Calibrate(Told::Halted(Ended::Cancelled)));
+    window.hear(Update::Calibrate(Event::Halted(Ended::Cancelled)));
     window.idle();
     assert_eq!(window.says("the watched folder"), 0);
     assert!(!window.rig().join("targets").exists(), "nothing has begun");
@@ -124,7 +127,7 @@ fn a_build_without_chessboards_says_what_to_do() {
         |window| {
             super::make_uncalibrated(window, super::FRAME);
             let state = State { sees_chessboards: false, ..nothing_yet(window) };
-            window.hear(Update::Calibrate(Told::State(Box::new(state))));
+            window.hear(Update::Calibrate(Event::State(Box::new(state))));
             window.idle();
             assert!(window.harness.query_by_label("Take the picture (Space)").is_none());
         },
@@ -141,7 +144,7 @@ fn an_old_calibration_is_told_with_what_to_do() {
             window.enter(Room::Calibrate);
             window.until_label("The rig is calibrated");
             let state = State { age_days: Some(200), ..nothing_yet(window) };
-            window.hear(Update::Calibrate(Told::State(Box::new(state))));
+            window.hear(Update::Calibrate(Event::State(Box::new(state))));
             window.idle();
             assert_eq!(window.says("Calibrated 200 days ago"), 1);
         },
@@ -206,7 +209,7 @@ fn a_light_board_that_does_not_answer_is_told_with_its_remedy() {
             };
             let what = "Nikon D5100 at usb:001,004, battery 80 %".to_owned();
             let cameras = vec![CameraFinding { what, problem: None }];
-            window.hear(Update::Rig(rig::Told::Found { boards: vec![silent], cameras }));
+            window.hear(Update::Rig(rig::Event::Found { boards: vec![silent], cameras }));
             window.idle();
             assert_eq!(window.says("nothing answers"), 1);
         },

@@ -1,10 +1,12 @@
 //! What the pictures of a step cover so far, how good they are, and what the next one brings.
 
-use super::task::{BOARDS, Pose, State, Step, Task};
-use super::view::name;
+use crate::rooms::calibrate::view::name;
 use crate::texts::calibrate as texts;
-use crate::theme::{self, meaning};
-use eframe::egui::{self, Color32, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, vec2};
+use crate::ui::theme;
+use crate::ui::theme::meaning;
+use eframe::egui;
+use eframe::egui::{Color32, Painter, Pos2, Rect, RichText, Stroke, StrokeKind, vec2};
+use weavelight::calibrate::wizard::{BOARDS, Placement, Pose, State, Step, Task};
 
 /// Height of the panel.
 pub(super) const HEIGHT: f32 = 108.0;
@@ -87,7 +89,7 @@ fn sheets(ui: &mut egui::Ui, state: &State) {
 /// A sheet from above: raised, it stands off its own outline on the table; tilted, an arrow says where it faces. Filled:
 /// photographed.
 fn sheet(painter: &Painter, at: Pos2, pose: Pose, (color, is_taken): (Color32, bool)) {
-    let [height_mm, tilt_deg, towards_deg] = pose.lies();
+    let Placement { height_mm, tilt_deg, faces_deg } = pose.placement();
     let stroke = Stroke::new(1.5, color);
     let side = vec2(24.0, 18.0);
     let rect = Rect::from_center_size(at, side);
@@ -103,7 +105,7 @@ fn sheet(painter: &Painter, at: Pos2, pose: Pose, (color, is_taken): (Color32, b
     let fill = if is_taken { color.gamma_multiply(0.35) } else { Color32::TRANSPARENT };
     painter.rect(rect, 1.0, fill, stroke, StrokeKind::Middle);
     if tilt_deg > 0.0 {
-        let (sin, cos) = towards_deg.to_radians().sin_cos();
+        let (sin, cos) = faces_deg.to_radians().sin_cos();
         // The picture's top is up, the screen's down.
         let along = vec2(cos as f32, -sin as f32);
         painter.arrow(at - 5.0 * along, 12.0 * along, stroke);

@@ -1,7 +1,8 @@
 //! What came of a fit, in a few words.
 
-use super::{Report, Step};
+use crate::jobs::calibrate::Report;
 use crate::texts::calibrate as texts;
+use weavelight::calibrate::wizard::Step;
 
 /// The step and its figures.
 pub(super) fn text(report: &Report) -> (Step, String) {

@@ -1,17 +1,20 @@
 //! How the wizard looks.
 
-use super::history::Entry;
-use super::picture::{Picture, paint_earlier};
-use super::task::{State, Step, TargetSettings, Task};
-use crate::browse::Browse;
-use crate::number::{Number, Unit};
-use crate::place::Place;
+use crate::model::number::Unit;
+use crate::model::project::Project;
+use crate::model::targets::TargetSettings;
 use crate::texts::calibrate as texts;
-use crate::theme::{self, meaning};
-use crate::widgets::{self, Sign};
+use crate::ui::browse::Browse;
+use crate::ui::number::Number;
+use crate::ui::theme::meaning;
+use crate::ui::widgets::Sign;
+use crate::ui::{theme, widgets};
+use crate::viewer::target_picture::{Picture, paint_earlier};
+use eframe::egui;
 use eframe::egui::emath::Numeric;
-use eframe::egui::{self, RichText, TextureHandle, TextureOptions, vec2};
+use eframe::egui::{RichText, TextureHandle, TextureOptions, vec2};
 use std::path::Path;
+use weavelight::calibrate::wizard::{Entry, State, Step, Task};
 use weavelight::calibrate::{Action, StepState};
 use weavelight::instrument::CameraKind;
 
@@ -78,7 +81,7 @@ fn nothing_yet(ui: &mut egui::Ui) {
 }
 
 /// Whether the program lays the targets on the table by itself.
-pub(super) fn lays_by_itself(place: &Place) -> bool {
+pub(super) fn lays_by_itself(place: &Project) -> bool {
     place.rig.camera.kind == CameraKind::Simulated
 }
 
@@ -201,13 +204,13 @@ pub(super) fn verdict(ui: &mut egui::Ui, state: &State, is_old: bool) -> bool {
     }
     ui.add_space(theme::GAP);
     let size = vec2(220.0, theme::BIG);
-    let scan = crate::widgets::primary(ui, texts::SCAN, size, true).clicked();
+    let scan = crate::ui::widgets::primary(ui, texts::SCAN, size, true).clicked();
     ui.add_space(theme::GAP);
     scan
 }
 
 /// What went wrong last and what to do, and where something went that was put away.
-pub(super) fn told(ui: &mut egui::Ui, trouble: Option<&str>, kept: Option<&Path>) {
+pub(super) fn outcome(ui: &mut egui::Ui, trouble: Option<&str>, kept: Option<&Path>) {
     if let Some(trouble) = trouble {
         ui.horizontal_top(|ui| {
             Sign::Bad.ui(ui);
@@ -238,7 +241,7 @@ pub(super) fn targets(
     task: Task,
     targets: &mut TargetSettings,
     browse: &mut Browse,
-    place: Option<&Place>,
+    place: Option<&Project>,
 ) -> bool {
     let last_light = place.map_or(0, |place| place.rig.lights.len().saturating_sub(1));
     let row = ui.horizontal_wrapped(|ui| match task {
@@ -263,8 +266,8 @@ pub(super) fn targets(
             let height = Number::of(Unit::Millimetres, 1.0..=300.0);
             reflectance
                 && match pose {
-                    super::Pose::Flat => true,
-                    super::Pose::Raised => {
+                    weavelight::calibrate::wizard::Pose::Flat => true,
+                    weavelight::calibrate::wizard::Pose::Raised => {
                         field(ui, texts::RAISED, &height, &mut targets.raised_mm)
                     }
                     _ => shape(ui, texts::STRIP, &mut targets.strip, &mut targets.strip_square_mm),

@@ -1,17 +1,24 @@
 //! The maps with what is drawn over them, and what the mouse does there.
 
-use super::lamp::Kind;
-use super::legend::{line, tag};
-use super::profile::along;
-use super::view::{self, Compose, Geometry, Shown};
-use super::{Ask, Look, Taken, Tool};
-use crate::desk::Desk;
+use crate::jobs::look::Command;
+use crate::jobs::messages::Request;
+use crate::jobs::state::AppState;
+use crate::rooms::look::lamp::Kind;
+use crate::rooms::look::legend::{line, tag};
+use crate::rooms::look::{Look, Taken, Tool};
 use crate::texts::look as texts;
-use crate::theme::{self, meaning};
-use crate::worker::Command;
+use crate::ui::theme;
+use crate::ui::theme::meaning;
+use crate::viewer::appearance::Compose;
+use crate::viewer::canvas::Canvas as MapCanvas;
+use crate::viewer::geometry::Geometry;
+use crate::viewer::map_view::Shown;
+use crate::viewer::map_view::can_draw;
+use crate::viewer::profile::along;
+use eframe::egui;
 use eframe::egui::{
-    self, Align2, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, Ui,
-    Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, ColorImage, CursorIcon, Pos2, Rect, Sense, Stroke, TextureHandle, Ui, Vec2,
+    WidgetInfo, pos2, vec2,
 };
 
 /// What is being drawn, and what was drawn for the mask.
@@ -49,7 +56,7 @@ const OUTSIDE: Color32 = Color32::from_rgba_premultiplied(110, 48, 0, 130);
 
 impl Look {
     /// The maps and everything over them.
-    pub(super) fn maps(&mut self, ui: &mut Ui, desk: &mut Desk) {
+    pub(super) fn maps(&mut self, ui: &mut Ui, app: &mut AppState) {
         let Some(maps) = self.opened.as_ref().map(|opened| opened.maps.clone()) else { return };
         self.lamp.advance(f64::from(ui.input(|input| input.stable_dt)));
         if self.lamp.moves && self.lamp.kind == Kind::Sun {
@@ -59,7 +66,7 @@ impl Look {
         let shown = self.view.begin(ui, &maps, (texts::MAPS, drag_pans));
         self.hovered(&shown, maps.size());
         match self.tool {
-            Tool::Hand => self.hand(ui, &shown, &maps.geometry, desk),
+            Tool::Hand => self.hand(ui, &shown, &maps.geometry, app),
             Tool::Line => self.draw_line(&shown),
             Tool::Brush | Tool::Lasso => self.paint(&shown, maps.size()),
         }
@@ -67,9 +74,9 @@ impl Look {
         // Only now the light is where the hand is.
         let appearance = self.appearance();
         let canvas =
-            view::Canvas { maps: &maps, appearance: &appearance, name: texts::MAPS, drag_pans };
+            MapCanvas { maps: &maps, appearance: &appearance, name: texts::MAPS, drag_pans };
         self.view.paint(ui, &shown, &canvas);
-        if !view::can_draw(ui.ctx()) {
+        if !can_draw(ui.ctx()) {
             // Nothing to draw over.
             return;
         }
@@ -95,7 +102,7 @@ impl Look {
     }
 
     /// Moves the light; a click takes a photosite.
-    fn hand(&mut self, ui: &Ui, shown: &Shown, geometry: &Geometry, desk: &mut Desk) {
+    fn hand(&mut self, ui: &Ui, shown: &Shown, geometry: &Geometry, app: &mut AppState) {
         let response = &shown.response;
         if self.light_is_in_hand() {
             if is_dragged(response)
@@ -115,7 +122,7 @@ impl Look {
         if response.clicked()
             && let Some(at) = shown.pixel_under_mouse().and_then(|at| inside(at, geometry.size()))
         {
-            self.take_photosite(at, desk);
+            self.take_photosite(at, app);
         }
     }
 
@@ -134,12 +141,12 @@ impl Look {
     }
 
     /// Asks which lights a photosite rests on.
-    pub(super) fn take_photosite(&mut self, at: [usize; 2], desk: &mut Desk) {
+    pub(super) fn take_photosite(&mut self, at: [usize; 2], app: &mut AppState) {
         let Some(opened) = &self.opened else { return };
         let capture = opened.capture();
         let found = if capture.is_some() { None } else { Some(None) };
         if let Some(capture) = capture {
-            desk.ask(Command::Look(Ask::Photosite(capture.sources.clone(), at)));
+            app.request(Request::Look(Command::Photosite(capture.sources.clone(), at)));
         }
         self.taken = Some(Taken { at, found });
     }
@@ -182,7 +189,7 @@ impl Look {
             return;
         }
         let mask = self.opened.as_ref().and_then(|o| o.capture()).and_then(|c| c.mask.as_ref());
-        self.painting.get_or_insert_with(|| super::Painting::new(size, mask));
+        self.painting.get_or_insert_with(|| crate::viewer::mask::Painting::new(size, mask));
         if self.canvas.follow(shown) {
             self.finish_stroke();
         }
@@ -260,7 +267,7 @@ impl Look {
 
     /// The lamp, the sun, or the rig's light, where it is.
     fn show_light(&self, ui: &Ui, shown: &Shown, geometry: &Geometry) {
-        if !self.layers.shows(super::layer::Layer::Relit) {
+        if !self.layers.shows(crate::rooms::look::layer::Layer::Relit) {
             return;
         }
         let (at, text) = match self.lamp.kind {
@@ -374,7 +381,8 @@ impl Look {
         let named = |k: usize| {
             let layer = self.layers.sides[k];
             match layer {
-                super::layer::Layer::Frame | super::layer::Layer::Residual => {
+                crate::rooms::look::layer::Layer::Frame
+                | crate::rooms::look::layer::Layer::Residual => {
                     format!("{} · {}", layer.name(), texts::light(self.lamp.light))
                 }
                 _ => layer.name().to_owned(),
@@ -399,7 +407,7 @@ impl Look {
 
 impl Canvas {
     /// Whether strokes take away: as chosen, else they do, so that the first one over the cloth changes something.
-    pub(super) fn erases(&self, painting: Option<&super::Painting>) -> bool {
+    pub(super) fn erases(&self, painting: Option<&crate::viewer::mask::Painting>) -> bool {
         self.erases.unwrap_or_else(|| painting.is_none_or(|painting| !painting.is_empty()))
     }
 

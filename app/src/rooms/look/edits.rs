@@ -1,9 +1,9 @@
 //! What can be undone in this room, in the order in which it was done: the mask's steps and the line that is measured along.
 
-use super::Look;
+use crate::rooms::look::Look;
 
 /// Edits that can be undone.
-const MOST: usize = super::mask::MOST_STEPS;
+const MOST: usize = crate::viewer::mask::MOST_STEPS;
 
 /// A line that is measured along, pixel coordinates of its ends.
 pub(super) type Ends = [[f64; 2]; 2];
@@ -69,7 +69,7 @@ impl Look {
     /// Takes the last edit back.
     pub(super) fn undo(&mut self) {
         if let Some(edit) = self.edits.done.pop() {
-            let back = self.turn(edit, super::Painting::undo);
+            let back = self.turn(edit, crate::viewer::mask::Painting::undo);
             self.edits.undone.push(back);
         }
     }
@@ -77,7 +77,7 @@ impl Look {
     /// Does it again.
     pub(super) fn redo(&mut self) {
         if let Some(edit) = self.edits.undone.pop() {
-            let back = self.turn(edit, super::Painting::redo);
+            let back = self.turn(edit, crate::viewer::mask::Painting::redo);
             self.edits.done.push(back);
         }
     }
@@ -92,7 +92,7 @@ impl Look {
     }
 
     /// Undoes or redoes an edit; what it takes to turn it back.
-    fn turn(&mut self, edit: Edit, of_mask: fn(&mut super::Painting)) -> Edit {
+    fn turn(&mut self, edit: Edit, of_mask: fn(&mut crate::viewer::mask::Painting)) -> Edit {
         match edit {
             Edit::Mask => {
                 self.painting.iter_mut().for_each(of_mask);

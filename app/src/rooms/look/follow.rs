@@ -1,13 +1,18 @@
 //! Which solution is looked at: the last scan's, unless another one is asked for or this one is to stay; and what is offered
 //! where a folder is no solution.
 
-use super::drafts::Drafts;
-use super::edits::Edits;
-use super::{Ask, Look, Opened, Painting, Tool};
-use crate::desk::{Desk, Problem};
+use crate::jobs::look::Command;
+use crate::jobs::look::drafts::Drafts;
+use crate::jobs::look::opened::Opened;
+use crate::jobs::messages::Request;
+use crate::jobs::state::AppState;
+use crate::model::problem::Problem;
+use crate::rooms::look::edits::Edits;
+use crate::rooms::look::{Look, Tool};
 use crate::texts::look as texts;
-use crate::worker::Command;
-use eframe::egui::{self, RichText};
+use crate::viewer::mask::Painting;
+use eframe::egui;
+use eframe::egui::RichText;
 use std::path::PathBuf;
 
 /// What else there is to look at.
@@ -28,39 +33,39 @@ impl Look {
     }
 
     /// A capture session was opened that has no solution: it is asked about now.
-    pub(super) fn unsolved(&mut self, scan: PathBuf, desk: &mut Desk) {
+    pub(super) fn unsolved(&mut self, scan: PathBuf, app: &mut AppState) {
         (self.follow.newest, self.follow.unsolved) = (None, Some(scan));
-        desk.go_to(crate::rooms::Room::Look);
+        app.go_to(crate::model::room::Room::Look);
     }
 
     /// The room is entered: the last scan's solution is what there is to see.
-    pub fn enter(&mut self, desk: &mut Desk) {
-        let asked = desk.take_opening();
+    pub(super) fn open_newest(&mut self, app: &mut AppState) {
+        let asked = app.take_opening();
         if asked || self.follow.pinned && self.opened.is_some() {
             return;
         }
         if let Some(newest) = self.follow.newest.take() {
-            desk.ask(Command::Look(Ask::Open(newest)));
+            app.request(Request::Look(Command::Open(newest)));
         }
     }
 
     /// What else could be looked at, where there is something.
-    pub(super) fn offers(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    pub(super) fn offers(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         if let Some(newest) = self.follow.newest.clone() {
             let name = newest.file_name().unwrap_or_default().to_string_lossy().into_owned();
             match offer(ui, &texts::newer(&name), texts::SHOW_IT, true) {
-                Some(true) => desk.ask(Command::Look(Ask::Open(newest))),
+                Some(true) => app.request(Request::Look(Command::Open(newest))),
                 Some(false) => self.follow.newest = None,
                 None => {}
             }
         }
         if let Some(scan) = self.follow.unsolved.clone() {
             let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            match offer(ui, &texts::unsolved(&name), texts::SOLVE_IT, desk.can_change()) {
+            match offer(ui, &texts::unsolved(&name), texts::SOLVE_IT, app.can_change()) {
                 Some(true) => {
                     self.follow.unsolved = None;
-                    let settings = desk.settings.solve;
-                    desk.ask(Command::Look(Ask::SolveScan(scan, settings)));
+                    let settings = app.settings.solve;
+                    app.request(Request::Look(Command::SolveScan(scan, settings)));
                 }
                 Some(false) => self.follow.unsolved = None,
                 None => {}
@@ -70,7 +75,7 @@ impl Look {
 
     /// A new solution. The same one solved again keeps how it is looked at, and what was drawn; strokes that were not saved wait
     /// for their picture to be looked at again.
-    pub(super) fn take(&mut self, opened: Box<Opened>, desk: &mut Desk) {
+    pub(super) fn take(&mut self, opened: Box<Opened>, app: &mut AppState) {
         self.finish_stroke();
         let old = std::mem::take(self);
         (self.drafts, self.follow.pinned, self.browse) =
@@ -93,16 +98,16 @@ impl Look {
             self.lamp.hang_over(&opened.maps.geometry);
         }
         self.opened = Some(opened);
-        self.take_up_painting(desk);
+        self.take_up_painting(app);
         self.measure();
         if matches!(self.tool, Tool::Brush | Tool::Lasso) && !self.can_mask() {
             self.tool = Tool::Hand;
         }
-        desk.go_to(crate::rooms::Room::Look);
+        app.go_to(crate::model::room::Room::Look);
     }
 
     /// Strokes of this picture: those of this window, else those that an earlier one has left on the disk.
-    fn take_up_painting(&mut self, desk: &mut Desk) {
+    fn take_up_painting(&mut self, app: &mut AppState) {
         let opened = self.opened.as_deref();
         let Some(key) = key_of(opened).map(str::to_owned) else { return };
         let size = opened.map(|opened| opened.maps.size());
@@ -125,8 +130,8 @@ impl Look {
             _ => {
                 self.edits.forget_mask();
                 self.awaits_draft = true;
-                let file = Drafts::file(&desk.settings.drafts(), &key);
-                desk.ask(Command::Look(Ask::Draft(file)));
+                let file = Drafts::file(&app.settings.drafts(), &key);
+                app.request(Request::Look(Command::Draft(file)));
             }
         }
     }
@@ -136,10 +141,10 @@ impl Look {
         &mut self,
         file: PathBuf,
         draft: Option<weavelight_calibration::description::Image<bool>>,
-        desk: &mut Desk,
+        app: &mut AppState,
     ) {
         let opened = self.opened.as_deref();
-        let of_this = key_of(opened).map(|key| Drafts::file(&desk.settings.drafts(), key));
+        let of_this = key_of(opened).map(|key| Drafts::file(&app.settings.drafts(), key));
         if of_this != Some(file) {
             return;
         }
@@ -151,17 +156,17 @@ impl Look {
             self.painting = Some(painting);
             self.edits = Edits::default();
             self.edits.changed_mask();
-            desk.tell(Problem::warning(texts::MASK, texts::DRAFT_IS_BACK));
+            app.report(Problem::warning(texts::MASK, texts::DRAFT_IS_BACK));
         } else if let Some(key) = key_of(self.opened.as_deref()) {
             // It is what is on the disk.
-            self.drafts.forget(&desk.settings.drafts(), key);
+            self.drafts.forget(&app.settings.drafts(), key);
         }
     }
 
     /// Keeps strokes on the disk until they are saved.
-    pub(super) fn keep_draft(&mut self, desk: &mut Desk) {
+    pub(super) fn keep_draft(&mut self, app: &mut AppState) {
         if let Some(text) = self.drafts.trouble() {
-            desk.tell(Problem::error(texts::KEEPING_STROKES, text));
+            app.report(Problem::error(texts::KEEPING_STROKES, text));
         }
         let key = key_of(self.opened.as_deref()).map(str::to_owned);
         if let (Some(painting), Some(key)) = (&mut self.painting, key)
@@ -169,13 +174,13 @@ impl Look {
             && painting.kept != painting.version
         {
             painting.kept = painting.version;
-            self.drafts.keep(&desk.settings.drafts(), &key, painting.mask());
+            self.drafts.keep(&app.settings.drafts(), &key, painting.mask());
         }
     }
 
     /// A mask is on the disk; strokes that came since are not.
-    pub(super) fn mask_saved(&mut self, key: &str, version: u64, desk: &Desk) {
-        let folder = desk.settings.drafts();
+    pub(super) fn mask_saved(&mut self, key: &str, version: u64, app: &AppState) {
+        let folder = app.settings.drafts();
         if key_of(self.opened.as_deref()) != Some(key) {
             if let Some(mut painting) = self.drafts.take(key) {
                 if painting.version != version {

@@ -1,7 +1,8 @@
 //! The light over the cloth: a lamp in the hand, a sun, or one of the rig's own.
 
-use super::opened::Opened;
-use super::view::{Geometry, first_lamp, lamp_over, sun};
+use crate::jobs::look::opened::Opened;
+use crate::viewer::appearance::{first_lamp, lamp_over, sun};
+use crate::viewer::geometry::Geometry;
 use nalgebra::Point3;
 use weavelight_calibration::description::{DirectionalLight, Light, PointLight};
 use weavelight_calibration::irradiance::light_vector_in_rig;

@@ -1,9 +1,9 @@
 //! What can be shown, and what that takes.
 
-use super::Look;
-use super::lamp::Kind;
-use super::view::{Appearance, Compose, Mode, Scales, Side};
+use crate::rooms::look::Look;
+use crate::rooms::look::lamp::Kind;
 use crate::texts::look as texts;
+use crate::viewer::appearance::{Appearance, Compose, Mode, Scales, Side};
 
 /// What a side shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

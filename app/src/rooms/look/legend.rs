@@ -1,11 +1,15 @@
 //! What the colours stand for, and how long a millimetre is.
 
-use super::Look;
-use super::layer::Layer;
-use super::view::{Compose, Geometry, Shown, scales};
+use crate::rooms::look::Look;
+use crate::rooms::look::layer::Layer;
 use crate::texts::look as texts;
-use crate::theme;
-use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
+use crate::ui::theme;
+use crate::viewer::appearance::Compose;
+use crate::viewer::geometry::Geometry;
+use crate::viewer::map_view::Shown;
+use crate::viewer::scales;
+use eframe::egui;
+use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 
 /// Size of a scale, points.
 const SCALE: Vec2 = vec2(160.0, 10.0);

@@ -1,12 +1,15 @@
 //! A photosite from near: its neighbours, its numbers, and the lights that it rests on.
 
-use super::Look;
-use super::view::{Maps, Sample, shade};
+use crate::rooms::look::Look;
 use crate::texts::look as texts;
-use crate::theme::{self, meaning};
-use crate::widgets::Sign;
+use crate::ui::theme;
+use crate::ui::theme::meaning;
+use crate::ui::widgets::Sign;
+use crate::viewer::maps::{Maps, Sample};
+use crate::viewer::shade;
+use eframe::egui;
 use eframe::egui::{
-    self, Color32, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
+    Color32, Rect, RichText, Role, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
 };
 use weavelight::photometry::{Part, Photosite};
 
@@ -45,7 +48,7 @@ impl Look {
     }
 
     /// Which lights the photosite that was clicked rests on, and why not on the others.
-    fn lights_of(&self, ui: &mut Ui, taken: &super::Taken) {
+    fn lights_of(&self, ui: &mut Ui, taken: &crate::rooms::look::Taken) {
         ui.label(RichText::new(texts::photosite(taken.at)).strong());
         let changed = self.opened.as_ref().and_then(|o| o.capture()).map(|c| c.changed);
         match (&taken.found, changed) {

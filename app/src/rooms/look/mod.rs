@@ -9,126 +9,41 @@
 //! - [`slopes`], [`profile`], [`mask`]: the sums behind
 
 mod canvas;
-mod capture;
-mod drafts;
 mod edits;
 mod follow;
 mod lamp;
 mod layer;
 mod legend;
 mod loupe;
-pub mod mask;
-mod opened;
 mod plots;
-pub mod profile;
 mod side;
-pub mod slopes;
-pub mod view;
-mod work;
 
-pub use capture::{Capture, Sources};
-pub use opened::Opened;
-pub use work::Frames;
-
-use crate::browse::Browse;
-use crate::desk::Desk;
-use crate::rooms::Room;
-use crate::settings::SolveSettings;
+use crate::jobs::look::drafts::Drafts;
+use crate::jobs::look::opened::Opened;
+use crate::jobs::look::{Command, Event};
+use crate::jobs::messages::{Request, Update};
+use crate::jobs::state::AppState;
+use crate::model::paths;
+use crate::model::room::Room;
+use crate::rooms::RoomPanel;
+use crate::rooms::look::edits::Edits;
+use crate::rooms::look::follow::Follow;
+use crate::rooms::look::lamp::Lamp;
+use crate::rooms::look::layer::Layers;
 use crate::texts::look as texts;
-use crate::worker::{Command, Outbox, Tools};
-use crate::{paths, theme, widgets};
-use drafts::Drafts;
-use edits::Edits;
-use eframe::egui::{self, RichText};
-use follow::Follow;
-use lamp::Lamp;
-use layer::Layers;
-use mask::Painting;
-use slopes::Distribution;
+use crate::texts::rooms;
+use crate::ui::browse::Browse;
+use crate::ui::{theme, widgets};
+use crate::viewer::map_view::MapView;
+use crate::viewer::mask::Painting;
+use crate::viewer::profile;
+use crate::viewer::pyramid::Pyramid;
+use crate::viewer::slopes::Distribution;
+use eframe::egui;
+use eframe::egui::RichText;
 use std::path::PathBuf;
 use std::sync::Arc;
-use view::{MapView, Pyramid};
-use weavelight::photometry::Photosite;
-use weavelight_calibration::description::Image;
-
-/// What this room asks of the worker.
-#[derive(Debug)]
-pub enum Ask {
-    /// Look at the solution in this folder.
-    Open(PathBuf),
-    /// Compare with the solution in this folder; the surface is the one that is looked at.
-    Compare(PathBuf, Arc<Pyramid>),
-    /// What the frames of a light show.
-    Picture(Sources, usize),
-    /// What a light measures over what the solution predicts.
-    Residual(Sources, usize),
-    /// Solve one photosite again: which lights does it rest on?
-    Photosite(Sources, [usize; 2]),
-    /// Save the mask of a capture session.
-    Mask(Sources, Stroked),
-    /// The strokes in a file that were not saved.
-    Draft(PathBuf),
-    /// Solve the capture session in this folder, which has no solution yet, and look at that.
-    SolveScan(PathBuf, SolveSettings),
-    /// Solve again, into the solution's folder, and look at it.
-    Solve(Sources, PathBuf, SolveSettings),
-}
-
-/// A mask as it is when it is saved.
-#[derive(Debug)]
-pub struct Stroked {
-    /// What is inside.
-    pub mask: Image<bool>,
-    /// Of which picture.
-    pub key: String,
-    /// Which of its changes was the last one.
-    pub version: u64,
-}
-
-/// What the worker tells this room.
-#[derive(Debug)]
-pub enum Told {
-    /// A solution is there.
-    Opened(Box<Opened>),
-    /// Another solution to compare with.
-    Other {
-        /// Its name.
-        name: String,
-        /// Its normals.
-        surface: Arc<Pyramid>,
-        /// The angles between both.
-        angles: Option<Distribution>,
-    },
-    /// A light's frames.
-    Picture {
-        /// The light.
-        light: usize,
-        /// Linear RGB, as albedo times the light vector.
-        picture: Arc<Pyramid>,
-    },
-    /// A light's residual.
-    Residual {
-        /// The light.
-        light: usize,
-        /// Units of albedo.
-        picture: Arc<Pyramid>,
-    },
-    /// A photosite, solved again.
-    Photosite {
-        /// Which.
-        at: [usize; 2],
-        /// `None` where that failed.
-        found: Option<Box<Photosite>>,
-    },
-    /// The mask is on the disk: of this picture, with this last change.
-    MaskSaved(String, u64),
-    /// The strokes in a file, if there are some.
-    Draft(PathBuf, Option<Box<Image<bool>>>),
-    /// The solution of the last scan stands.
-    Newest(PathBuf),
-    /// A capture session that has no solution.
-    Unsolved(PathBuf),
-}
+use weavelight::solve::Photosite;
 
 /// What the mouse does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -197,54 +112,72 @@ struct Taken {
     found: Option<Option<Box<Photosite>>>,
 }
 
+impl RoomPanel for Look {
+    fn title(&self) -> &'static str {
+        rooms::LOOK
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        self.draw(ui, app);
+    }
+
+    fn hear(&mut self, update: Update, app: &mut AppState) {
+        if let Update::Look(event) = update {
+            self.take_event(event, app);
+        }
+    }
+
+    fn enter(&mut self, app: &mut AppState) {
+        self.open_newest(app);
+    }
+}
+
 impl Look {
-    /// Draws the room.
-    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        self.offers(ui, desk);
+    fn draw(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        self.offers(ui, app);
         if self.opened.is_none() {
-            return self.nothing_yet(ui, desk);
+            return self.nothing_yet(ui, app);
         }
         self.keys(ui);
-        egui::Panel::top("look head").show(ui, |ui| self.head(ui, desk));
+        egui::Panel::top("look head").show(ui, |ui| self.head(ui, app));
         egui::Panel::right("look side")
             .exact_size(side::WIDTH)
             .resizable(false)
-            .show(ui, |ui| self.side(ui, desk));
+            .show(ui, |ui| self.side(ui, app));
         if self.profile.is_some() || self.tool == Tool::Line {
             egui::Panel::bottom("look profile").exact_size(190.0).show(ui, |ui| self.plot(ui));
         }
         let frame = egui::Frame::new().inner_margin(0);
-        egui::CentralPanel::default().frame(frame).show(ui, |ui| self.maps(ui, desk));
-        self.await_layers(desk);
-        self.keep_draft(desk);
+        egui::CentralPanel::default().frame(frame).show(ui, |ui| self.maps(ui, app));
+        self.await_layers(app);
+        self.keep_draft(app);
     }
 
-    /// Takes in what the worker tells.
-    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
-        match told {
-            Told::Opened(opened) => self.take(opened, desk),
-            Told::Other { name, surface, angles } => {
+    fn take_event(&mut self, event: Event, app: &mut AppState) {
+        match event {
+            Event::Opened(opened) => self.take(opened, app),
+            Event::Other { name, surface, angles } => {
                 self.other = Some(Other { name, surface, angles });
                 self.layers.compare();
                 self.path.clear();
             }
-            Told::Picture { light, picture } => {
+            Event::Picture { light, picture } => {
                 self.awaited = None;
                 self.picture = Some((light, picture));
             }
-            Told::Residual { light, picture } => {
+            Event::Residual { light, picture } => {
                 self.awaited = None;
                 self.residual = Some((light, picture));
             }
-            Told::Photosite { at, found } => {
+            Event::Photosite { at, found } => {
                 if let Some(taken) = self.taken.as_mut().filter(|taken| taken.at == at) {
                     taken.found = Some(found);
                 }
             }
-            Told::MaskSaved(key, version) => self.mask_saved(&key, version, desk),
-            Told::Draft(file, draft) => self.take_draft(file, draft.map(|draft| *draft), desk),
-            Told::Newest(solution) => self.newest(solution),
-            Told::Unsolved(scan) => self.unsolved(scan, desk),
+            Event::MaskSaved(key, version) => self.mask_saved(&key, version, app),
+            Event::Draft(file, draft) => self.take_draft(file, draft.map(|draft| *draft), app),
+            Event::Newest(solution) => self.newest(solution),
+            Event::Unsolved(scan) => self.unsolved(scan, app),
         }
     }
 
@@ -253,7 +186,7 @@ impl Look {
         self.opened.as_deref()
     }
 
-    fn nothing_yet(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn nothing_yet(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         widgets::heading(ui, texts::HEADING, texts::WHAT);
         ui.add_space((ui.available_height() * 0.22).max(theme::GAP));
         ui.vertical_centered(|ui| {
@@ -261,7 +194,7 @@ impl Look {
             ui.add_space(theme::GAP);
             let size = egui::vec2(180.0, theme::BIG);
             if widgets::primary(ui, texts::TO_SCANS, size, true).clicked() {
-                desk.go_to(Room::Scans);
+                app.go_to(Room::Scans);
             }
         });
         ui.add_space(2.0 * theme::WIDE_GAP);
@@ -271,7 +204,7 @@ impl Look {
             egui::UiBuilder::new().max_rect(egui::Rect::from_center_size(row.center(), size));
         ui.scope_builder(field, |ui| {
             self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
-                desk.ask(Command::Look(Ask::Open(folder)));
+                app.request(Request::Look(Command::Open(folder)));
             });
         });
     }
@@ -325,7 +258,7 @@ impl Look {
         }
     }
 
-    fn head(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn head(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let Some(opened) = &self.opened else { return };
         let (name, about) = (opened.name.clone(), about(opened));
         let warnings = opened.warnings.join("\n");
@@ -338,14 +271,14 @@ impl Look {
                 let open = widgets::menu(ui, texts::OPEN_MENU, |ui| {
                     ui.set_min_width(menu_width(ui));
                     self.path_field(ui, texts::FOLDER, texts::OPEN, |folder| {
-                        desk.ask(Command::Look(Ask::Open(folder)));
+                        app.request(Request::Look(Command::Open(folder)));
                     });
                     ui.checkbox(&mut self.follow.pinned, texts::PIN).on_hover_text(texts::PIN_HINT);
                 });
                 let compare = widgets::menu(ui, texts::COMPARE_MENU, |ui| {
                     ui.set_min_width(menu_width(ui));
                     self.path_field(ui, texts::FOLDER, texts::COMPARE, |folder| {
-                        desk.ask(Command::Look(Ask::Compare(folder, surface.clone())));
+                        app.request(Request::Look(Command::Compare(folder, surface.clone())));
                     });
                 });
                 // The field is what they are about.
@@ -400,12 +333,12 @@ impl Look {
     }
 
     /// Asks for a light's picture or residual where one is shown that is not there.
-    fn await_layers(&mut self, desk: &mut Desk) {
+    fn await_layers(&mut self, app: &mut AppState) {
         let Some(capture) = self.opened.as_ref().and_then(|opened| opened.capture()) else {
             return;
         };
         let light = self.lamp.light;
-        if self.awaited.is_some() || desk.is_busy() || !capture.lights.contains(&light) {
+        if self.awaited.is_some() || app.is_busy() || !capture.lights.contains(&light) {
             return;
         }
         let there =
@@ -413,10 +346,10 @@ impl Look {
         let sources = capture.sources.clone();
         if self.layers.shows_frame() && !there(&self.picture) {
             self.awaited = Some(Awaited::Picture(light));
-            desk.ask(Command::Look(Ask::Picture(sources, light)));
+            app.request(Request::Look(Command::Picture(sources, light)));
         } else if self.layers.shows_residual() && !there(&self.residual) {
             self.awaited = Some(Awaited::Residual(light));
-            desk.ask(Command::Look(Ask::Residual(sources, light)));
+            app.request(Request::Look(Command::Residual(sources, light)));
         }
     }
 }
@@ -431,9 +364,4 @@ fn about(opened: &Opened) -> String {
     let size = texts::size(opened.maps.size());
     let scale = opened.mm_per_px.map_or_else(String::new, texts::scale);
     format!("{size}{scale} · {}", opened.method)
-}
-
-/// The worker's part.
-pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
-    work::act(ask, tools, out);
 }

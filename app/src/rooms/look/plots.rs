@@ -1,10 +1,11 @@
 //! Histogram of slopes and the profile along a line.
 
-use super::slopes::Distribution;
-use super::{Look, Tool};
+use crate::rooms::look::{Look, Tool};
 use crate::texts::look as texts;
-use crate::theme::meaning;
-use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
+use crate::ui::theme::meaning;
+use crate::viewer::slopes::Distribution;
+use eframe::egui;
+use eframe::egui::{Align2, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 use egui_plot::{HLine, Line, Plot, PlotPoints};
 
 /// Height of a histogram, points.

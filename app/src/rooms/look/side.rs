@@ -1,17 +1,22 @@
 //! The panel beside the maps: what is shown, the light, the photosite, the slopes, the mask.
 
-use super::lamp::Kind;
-use super::layer::Layer;
-use super::view::Compose;
-use super::{Ask, Look, Opened, Stroked, Tool, plots};
-use crate::desk::Desk;
-use crate::number::{Number, Unit};
-use crate::settings::{MethodName, SolveSettings};
+use crate::jobs::look::opened::Opened;
+use crate::jobs::look::{Command, Stroked};
+use crate::jobs::messages::Request;
+use crate::jobs::state::AppState;
+use crate::model::number::Unit;
+use crate::model::settings::{MethodName, SolveSettings};
+use crate::rooms::look::lamp::Kind;
+use crate::rooms::look::layer::Layer;
+use crate::rooms::look::{Look, Tool, plots};
 use crate::texts::look as texts;
-use crate::widgets::{self, Sign};
-use crate::worker::Command;
+use crate::ui::number::Number;
+use crate::ui::widgets;
+use crate::ui::widgets::Sign;
+use crate::viewer::appearance::Compose;
+use eframe::egui;
 use eframe::egui::emath::Numeric;
-use eframe::egui::{self, Button, ComboBox, RichText, ScrollArea, Slider, Ui, vec2};
+use eframe::egui::{Button, ComboBox, RichText, ScrollArea, Slider, Ui, vec2};
 
 /// Width of the panel, points.
 pub(super) const WIDTH: f32 = 296.0;
@@ -23,7 +28,7 @@ const VALUE: f32 = 66.0;
 const ROW: f32 = 24.0;
 
 impl Look {
-    pub(super) fn side(&mut self, ui: &mut Ui, desk: &mut Desk) {
+    pub(super) fn side(&mut self, ui: &mut Ui, app: &mut AppState) {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             let spacing = ui.spacing_mut();
             spacing.interact_size = vec2(VALUE, ROW);
@@ -33,7 +38,7 @@ impl Look {
             self.layers_section(ui);
             self.light_section(ui);
             if self.painting.is_some() || matches!(self.tool, Tool::Brush | Tool::Lasso) {
-                self.mask_section(ui, desk);
+                self.mask_section(ui, app);
             }
             section(ui, texts::PHOTOSITE, |ui| self.loupe(ui));
             let opened = self.opened.as_ref();
@@ -204,7 +209,7 @@ impl Look {
         }
     }
 
-    fn mask_section(&mut self, ui: &mut Ui, desk: &mut Desk) {
+    fn mask_section(&mut self, ui: &mut Ui, app: &mut AppState) {
         named(ui, RichText::new(texts::MASK).strong(), |ui, _| {
             let mut erases = self.canvas.erases(self.painting.as_ref());
             let keep = ui.selectable_value(&mut erases, false, texts::KEEP).clicked();
@@ -234,14 +239,14 @@ impl Look {
                 self.edits.changed_mask();
             }
         });
-        let ready = painting.changed && !painting.is_empty() && desk.can_change();
+        let ready = painting.changed && !painting.is_empty() && app.can_change();
         let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
         if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
             let (sources, key) = (capture.sources.clone(), capture.key.clone());
             let stroked = Stroked { mask: painting.mask().clone(), key, version: painting.version };
-            desk.ask(Command::Look(Ask::Mask(sources.clone(), stroked)));
-            let (folder, how) = (opened.folder.clone(), as_it_was(opened, desk.settings.solve));
-            desk.ask(Command::Look(Ask::Solve(sources, folder, how)));
+            app.request(Request::Look(Command::Mask(sources.clone(), stroked)));
+            let (folder, how) = (opened.folder.clone(), as_it_was(opened, app.settings.solve));
+            app.request(Request::Look(Command::Solve(sources, folder, how)));
         }
         rule(ui);
     }

@@ -1,49 +1,22 @@
 //! The Rig room: board, camera, and the lights as a sketch seen from the side and from above; each can be lit.
 
 mod sketch;
-mod work;
 
-use crate::desk::Desk;
-use crate::place::Place;
+use crate::jobs::messages::{Request, Update};
+use crate::jobs::rig::{Command, Event};
+use crate::jobs::state::AppState;
+use crate::rooms::RoomPanel;
+use crate::rooms::rig::sketch::{Lamp, Side};
 use crate::texts::rig as texts;
-use crate::theme;
-use crate::widgets::{self, Sign};
-use crate::worker::{Command, Outbox, Tools};
-use eframe::egui::{self, RichText};
-use sketch::{Lamp, Side};
+use crate::texts::rooms;
+use crate::ui::widgets::Sign;
+use crate::ui::{theme, widgets};
+use eframe::egui;
+use eframe::egui::RichText;
 use weavelight::device::scan::CameraFinding;
 use weavelight::doctor::LightBoard;
 use weavelight::instrument::{CalibratedLight, RigLightPlace};
 use weavelight_calibration::description::Light;
-
-/// What this room asks of the worker.
-#[derive(Clone, Debug)]
-pub enum Ask {
-    /// Look for board and camera.
-    Find,
-    /// Light one of the rig's lights; `None`: all off.
-    Light(Option<usize>),
-    /// One light after the other.
-    TestEach,
-    /// What a rig's calibration says of the lights.
-    ReadCalibration(Box<Place>),
-}
-
-/// What the worker tells this room.
-#[derive(Debug)]
-pub enum Told {
-    /// What was found.
-    Found {
-        /// Light boards, and ports without one.
-        boards: Vec<LightBoard>,
-        /// Cameras.
-        cameras: Vec<CameraFinding>,
-    },
-    /// What is lit now.
-    Lit(Option<usize>),
-    /// The calibrated lights; empty where there are none.
-    Lights(Vec<CalibratedLight>),
-}
 
 /// What this room keeps.
 #[derive(Debug, Default)]
@@ -54,30 +27,61 @@ pub struct Rig {
     asked: bool,
 }
 
+impl RoomPanel for Rig {
+    fn title(&self) -> &'static str {
+        rooms::RIG
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        self.draw(ui, app);
+    }
+
+    fn hear(&mut self, update: Update, app: &mut AppState) {
+        if let Update::Rig(event) = update {
+            self.take_event(event, app);
+        }
+    }
+
+    /// No light stays on.
+    fn leave(&mut self, app: &mut AppState) {
+        self.asked = false;
+        if self.lit.is_some() {
+            app.request(Request::Rig(Command::Light(None)));
+        }
+    }
+
+    fn rig_opened(&mut self, _app: &mut AppState) {
+        *self = Self::default();
+    }
+
+    fn rig_released(&mut self, _app: &mut AppState) {
+        self.asked = false;
+    }
+
+    /// The lights may have been calibrated.
+    fn job_ended(&mut self) {
+        self.asked = false;
+    }
+}
+
 impl Rig {
-    /// Draws the room.
-    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        if let Some(place) = desk.place.clone().filter(|_| !self.asked) {
+    fn draw(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        if let Some(place) = app.project.clone().filter(|_| !self.asked) {
             self.asked = true;
-            desk.ask(Command::Rig(Ask::ReadCalibration(Box::new(place))));
+            app.request(Request::Rig(Command::ReadCalibration(Box::new(place))));
         }
         let pane = egui::Panel::left("rig parts").exact_size(320.0).resizable(false);
         pane.show(ui, |ui| {
             egui::ScrollArea::vertical().show(ui, |ui| {
-                self.parts(ui, desk);
+                self.parts(ui, app);
                 widgets::reveal_focus(ui);
             });
         });
-        egui::CentralPanel::default().show(ui, |ui| self.lights(ui, desk));
+        egui::CentralPanel::default().show(ui, |ui| self.lights(ui, app));
     }
 
-    /// The lights may have been calibrated.
-    pub fn is_stale(&mut self) {
-        self.asked = false;
-    }
-
-    fn parts(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some(place) = &desk.place else { return };
+    fn parts(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        let Some(place) = &app.project else { return };
         let name = place.rig.name.clone();
         let folder = place.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let path = place.folder.display().to_string();
@@ -87,8 +91,8 @@ impl Rig {
         ui.label(camera);
         ui.separator();
         let find = egui::Button::new(texts::FIND);
-        if ui.add_enabled(desk.can_change(), find).on_hover_text(texts::FIND_HINT).clicked() {
-            desk.ask(Command::Rig(Ask::Find));
+        if ui.add_enabled(app.can_change(), find).on_hover_text(texts::FIND_HINT).clicked() {
+            app.request(Request::Rig(Command::Find));
         }
         match &self.found {
             None => {
@@ -105,24 +109,24 @@ impl Rig {
         }
         ui.separator();
         if ui.button(texts::OTHER_RIG).clicked() {
-            desk.place = None;
-            desk.held_by = None;
-            desk.ask(Command::Close);
-            desk.settings.rig = None;
+            app.project = None;
+            app.held_by = None;
+            app.request(Request::Close);
+            app.settings.rig = None;
         }
     }
 
-    fn lights(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some(place) = desk.place.clone() else { return };
+    fn lights(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        let Some(place) = app.project.clone() else { return };
         let lamps = self.lamps(&place.rig);
         ui.horizontal(|ui| {
             ui.heading(texts::LIGHTS);
-            let free = desk.can_change();
+            let free = app.can_change();
             if ui.add_enabled(free, egui::Button::new(texts::TEST_EACH)).clicked() {
-                desk.ask(Command::Rig(Ask::TestEach));
+                app.request(Request::Rig(Command::TestEach));
             }
             if ui.add_enabled(self.lit.is_some(), egui::Button::new(texts::ALL_OFF)).clicked() {
-                desk.ask(Command::Rig(Ask::Light(None)));
+                app.request(Request::Rig(Command::Light(None)));
             }
         });
         ui.label(RichText::new(texts::CLICK_A_LIGHT).weak());
@@ -140,9 +144,9 @@ impl Rig {
             clicked = clicked.or(self.table(ui, &lamps));
             widgets::reveal_focus(ui);
         });
-        if let Some(light) = clicked.filter(|_| desk.can_change()) {
+        if let Some(light) = clicked.filter(|_| app.can_change()) {
             let wanted = (self.lit != Some(light)).then_some(light);
-            desk.ask(Command::Rig(Ask::Light(wanted)));
+            app.request(Request::Rig(Command::Light(wanted)));
         }
     }
 
@@ -184,25 +188,11 @@ impl Rig {
         clicked
     }
 
-    /// Takes in what the worker tells.
-    pub fn hear(&mut self, told: Told, _desk: &mut Desk) {
-        match told {
-            Told::Found { boards, cameras } => self.found = Some((boards, cameras)),
-            Told::Lit(light) => self.lit = light,
-            Told::Lights(lights) => self.calibrated = lights,
-        }
-    }
-
-    /// Another rig.
-    pub fn reset(&mut self, _desk: &mut Desk) {
-        *self = Self::default();
-    }
-
-    /// The room is left: nothing stays lit.
-    pub fn leave(&mut self, desk: &mut Desk) {
-        self.asked = false;
-        if self.lit.is_some() {
-            desk.ask(Command::Rig(Ask::Light(None)));
+    fn take_event(&mut self, event: Event, _desk: &mut AppState) {
+        match event {
+            Event::Found { boards, cameras } => self.found = Some((boards, cameras)),
+            Event::Lit(light) => self.lit = light,
+            Event::Lights(lights) => self.calibrated = lights,
         }
     }
 }
@@ -218,9 +208,4 @@ fn finding(ui: &mut egui::Ui, what: &str, problem: Option<&String>) {
             }
         });
     });
-}
-
-/// The worker's part.
-pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
-    work::act(ask, tools, out);
 }

@@ -1,8 +1,9 @@
 //! The rig drawn to scale, from the front or from above: table, camera, lights; the lit one glows.
 
 use crate::texts::rig as texts;
-use crate::theme::meaning;
-use eframe::egui::{self, Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Vec2, pos2, vec2};
+use crate::ui::theme::meaning;
+use eframe::egui;
+use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Vec2, pos2, vec2};
 
 /// From where it is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

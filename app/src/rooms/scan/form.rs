@@ -1,81 +1,19 @@
 //! What is to be scanned: name, thickness, exposure.
 
-use super::{Ask, Order, What};
-use crate::desk::Desk;
-use crate::names::Taken;
-use crate::number::{Number, Unit};
-use crate::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
-use crate::worker::Command;
-use crate::{texts::scan as texts, theme, widgets};
-use eframe::egui::{self, RichText};
-use serde::{Deserialize, Serialize};
+use crate::jobs::messages::Request;
+use crate::jobs::scan::{Command, Order, What};
+use crate::jobs::state::AppState;
+use crate::model::number::Unit;
+use crate::model::scan_form::ScanForm;
+use crate::model::settings::{DeviceName, MethodName, NormalYName, SolveSettings};
+use crate::texts::scan as texts;
+use crate::ui::number::Number;
+use crate::ui::{theme, widgets};
+use eframe::egui;
+use eframe::egui::RichText;
 use weavelight::device::camera::Settings;
 use weavelight::instrument::CameraKind;
 use weavelight_sim::cloth::Preset;
-
-/// What the technician writes for a scan; remembered, so that the next day begins where this one ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct FormSettings {
-    /// Of the swatch.
-    pub name: String,
-    /// Of the swatch, millimetres; 0: not measured.
-    pub thickness_mm: f64,
-    /// Whether test shots find the exposure.
-    pub find_exposure: bool,
-    /// Where they do not.
-    pub exposure_s: f64,
-    /// Sensitivity.
-    pub iso: f64,
-}
-
-impl Default for FormSettings {
-    fn default() -> Self {
-        Self {
-            name: texts::FIRST_NAME.to_owned(),
-            thickness_mm: 0.0,
-            find_exposure: true,
-            exposure_s: 0.1,
-            iso: 100.0,
-        }
-    }
-}
-
-impl FormSettings {
-    /// Counts the name on until no scan has it.
-    pub(super) fn next_free_name(&mut self, taken: &Taken) {
-        while taken.has(self.name.trim()) {
-            self.name = next_name(&self.name);
-        }
-    }
-
-    /// The fields for numbers. Whether all of them can be read.
-    fn numbers(&mut self, ui: &mut egui::Ui) -> bool {
-        let label = ui.label(texts::THICKNESS);
-        let thickness = Number::of(Unit::Millimetres, 0.0..=100.0).speed(0.05).decimals(2..=3);
-        let thickness = thickness.unset(texts::NOT_MEASURED);
-        let thickness = thickness.show(ui, texts::THICKNESS, &mut self.thickness_mm);
-        thickness.response.labelled_by(label.id);
-        ui.end_row();
-        let label = ui.label(texts::EXPOSURE);
-        let exposure = ui.horizontal(|ui| {
-            ui.checkbox(&mut self.find_exposure, texts::FIND_EXPOSURE);
-            let exposure = Number::of(Unit::Seconds, 1e-4..=30.0).speed(0.005).decimals(0..=4);
-            let shown =
-                |ui: &mut egui::Ui| exposure.show(ui, texts::EXPOSURE, &mut self.exposure_s);
-            ui.add_enabled_ui(!self.find_exposure, shown).inner
-        });
-        let exposure = exposure.inner;
-        exposure.response.labelled_by(label.id);
-        ui.end_row();
-        let label = ui.label(texts::ISO);
-        let iso =
-            Number::of(Unit::Iso, 25.0..=25_600.0).speed(10.0).show(ui, texts::ISO, &mut self.iso);
-        iso.response.labelled_by(label.id);
-        ui.end_row();
-        thickness.is_read && exposure.is_read && iso.is_read
-    }
-}
 
 /// Of the panel with the big button, points.
 pub(super) const BUTTON_HEIGHT: f32 = 104.0;
@@ -98,26 +36,26 @@ impl Default for Form {
 }
 
 impl Form {
-    pub(super) fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    pub(super) fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         ui.add_space(theme::GAP);
         let label = ui.label(texts::NAME);
-        let form = &mut desk.settings.scan;
+        let form = &mut app.settings.scan;
         let field = egui::TextEdit::singleline(&mut form.name).desired_width(f32::INFINITY);
         ui.add(field).labelled_by(label.id);
-        let numbers = egui::Grid::new("scan numbers").num_columns(2);
-        self.unread = !numbers.show(ui, |ui| form.numbers(ui)).inner;
-        self.table(ui, desk);
+        let grid = egui::Grid::new("scan numbers").num_columns(2);
+        self.unread = !grid.show(ui, |ui| numbers(form, ui)).inner;
+        self.table(ui, app);
         ui.separator();
-        self.test(ui, desk);
+        self.test(ui, app);
         ui.separator();
-        ui.collapsing(texts::SOLVING, |ui| solving(ui, &mut desk.settings.solve));
+        ui.collapsing(texts::SOLVING, |ui| solving(ui, &mut app.settings.solve));
     }
 
     /// What lies on a simulated table can be chosen.
-    fn table(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn table(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let simulated =
-            |place: &crate::place::Place| place.rig.camera.kind == CameraKind::Simulated;
-        if !desk.place.as_ref().is_some_and(simulated) {
+            |place: &crate::model::project::Project| place.rig.camera.kind == CameraKind::Simulated;
+        if !app.project.as_ref().is_some_and(simulated) {
             return;
         }
         let before = self.fabric;
@@ -132,16 +70,16 @@ impl Form {
             shown.response.labelled_by(label.id);
         });
         if self.fabric != before {
-            desk.ask(Command::Scan(Ask::LayOut(self.fabric)));
-            desk.settings.scan.name = self.fabric.name().to_owned();
-            desk.settings.scan.next_free_name(&desk.taken);
+            app.request(Request::Scan(Command::LayOut(self.fabric)));
+            app.settings.scan.name = self.fabric.name().to_owned();
+            app.settings.scan.next_free_name(&app.taken);
         }
     }
 
-    fn test(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let lights = desk.place.as_ref().map_or(0, |place| place.rig.lights.len());
+    fn test(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        let lights = app.project.as_ref().map_or(0, |place| place.rig.lights.len());
         ui.horizontal(|ui| {
-            let can = desk.can_change() && !self.unread && !self.unread_light;
+            let can = app.can_change() && !self.unread && !self.unread_light;
             let clicked = ui
                 .add_enabled(can, egui::Button::new(texts::TEST_SHOT))
                 .on_hover_text(texts::TEST_SHOT_HINT)
@@ -153,26 +91,26 @@ impl Form {
             light.response.labelled_by(label.id);
             self.unread_light = !light.is_read;
             if clicked {
-                let FormSettings { exposure_s, iso, .. } = desk.settings.scan;
+                let ScanForm { exposure_s, iso, .. } = app.settings.scan;
                 let settings = Settings { exposure_s, iso };
                 let light = self.test_light.min(most);
-                desk.ask(Command::Scan(Ask::TestShot { light, settings }));
+                app.request(Request::Scan(Command::TestShot { light, settings }));
             }
         });
     }
 
     /// The big button: scans, or, where that is `done`, clears the table for the next swatch. True when it is clicked.
-    pub(super) fn button(&self, ui: &mut egui::Ui, desk: &Desk, done: bool) -> bool {
+    pub(super) fn button(&self, ui: &mut egui::Ui, app: &AppState, done: bool) -> bool {
         let size = egui::vec2(ui.available_width(), 1.3 * theme::BIG);
         let text = if done { texts::NEXT } else { texts::SCAN };
         // Without a calibration the room is about getting one.
-        let button = match desk.is_calibrated {
-            true => widgets::primary(ui, text, size, self.can_go(desk, done)),
-            false => widgets::large(ui, text, size, self.can_go(desk, done)),
+        let button = match app.is_calibrated {
+            true => widgets::primary(ui, text, size, self.can_go(app, done)),
+            false => widgets::large(ui, text, size, self.can_go(app, done)),
         };
         let clicked = button.clicked();
-        let taken = !done && desk.taken.has(desk.settings.scan.name.trim());
-        let hint = match (!desk.can_change(), taken, self.unread && !done) {
+        let taken = !done && app.taken.has(app.settings.scan.name.trim());
+        let hint = match (!app.can_change(), taken, self.unread && !done) {
             (true, ..) => texts::BUSY,
             (_, true, _) => texts::TAKEN,
             (.., true) => texts::UNREAD,
@@ -183,23 +121,23 @@ impl Form {
     }
 
     /// Whether the big button can be pressed.
-    pub(super) fn can_go(&self, desk: &Desk, done: bool) -> bool {
-        let name = desk.settings.scan.name.trim();
-        let free = !name.is_empty() && !desk.taken.has(name);
-        desk.can_change() && (done || (free && !self.unread))
+    pub(super) fn can_go(&self, app: &AppState, done: bool) -> bool {
+        let name = app.settings.scan.name.trim();
+        let free = !name.is_empty() && !app.taken.has(name);
+        app.can_change() && (done || (free && !self.unread))
     }
 }
 
-/// What to scan as the desk says.
-pub(super) fn order(desk: &Desk) -> Order {
-    let form = &desk.settings.scan;
+/// What to scan as the form says.
+pub(super) fn order(app: &AppState) -> Order {
+    let form = &app.settings.scan;
     Order {
         name: form.name.trim().to_owned(),
         thickness_mm: (form.thickness_mm > 0.0).then_some(form.thickness_mm),
         exposure_s: (!form.find_exposure).then_some(form.exposure_s),
         iso: form.iso,
         what: What::New,
-        solve: desk.settings.solve,
+        solve: app.settings.solve,
     }
 }
 
@@ -227,29 +165,28 @@ fn solving(ui: &mut egui::Ui, settings: &mut SolveSettings) {
     });
 }
 
-fn next_name(name: &str) -> String {
-    let name = name.trim();
-    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    match name[stem.len()..].parse::<u64>() {
-        Ok(number) => {
-            let width = name.len() - stem.len();
-            format!("{stem}{:0width$}", number.saturating_add(1))
-        }
-        Err(_) => format!("{name} 2"),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_count_on() {
-        let check = |name: &str, next: &str| assert_eq!(next_name(name), next);
-        check("linen 4021", "linen 4022");
-        check("linen", "linen 2");
-        check("A-009", "A-010");
-        check("99", "100");
-        check("x 99999999999999999999999", "x 99999999999999999999999 2");
-    }
+/// The fields for numbers. Whether all of them can be read.
+fn numbers(form: &mut ScanForm, ui: &mut egui::Ui) -> bool {
+    let label = ui.label(texts::THICKNESS);
+    let thickness = Number::of(Unit::Millimetres, 0.0..=100.0).speed(0.05).decimals(2..=3);
+    let thickness = thickness.unset(texts::NOT_MEASURED);
+    let thickness = thickness.show(ui, texts::THICKNESS, &mut form.thickness_mm);
+    thickness.response.labelled_by(label.id);
+    ui.end_row();
+    let label = ui.label(texts::EXPOSURE);
+    let exposure = ui.horizontal(|ui| {
+        ui.checkbox(&mut form.find_exposure, texts::FIND_EXPOSURE);
+        let exposure = Number::of(Unit::Seconds, 1e-4..=30.0).speed(0.005).decimals(0..=4);
+        let shown = |ui: &mut egui::Ui| exposure.show(ui, texts::EXPOSURE, &mut form.exposure_s);
+        ui.add_enabled_ui(!form.find_exposure, shown).inner
+    });
+    let exposure = exposure.inner;
+    exposure.response.labelled_by(label.id);
+    ui.end_row();
+    let label = ui.label(texts::ISO);
+    let iso =
+        Number::of(Unit::Iso, 25.0..=25_600.0).speed(10.0).show(ui, texts::ISO, &mut form.iso);
+    iso.response.labelled_by(label.id);
+    ui.end_row();
+    thickness.is_read && exposure.is_read && iso.is_read
 }

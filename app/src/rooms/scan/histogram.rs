@@ -1,8 +1,9 @@
 //! The histogram of a frame per channel, with what clips and how sharp it is.
 
 use crate::texts::scan as texts;
-use crate::theme::meaning;
-use eframe::egui::{self, Sense, Shape, Stroke, pos2, vec2};
+use crate::ui::theme::meaning;
+use eframe::egui;
+use eframe::egui::{Sense, Shape, Stroke, pos2, vec2};
 use weavelight::device::scan::{Channel, Look};
 
 /// Of the whole, points.

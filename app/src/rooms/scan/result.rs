@@ -1,19 +1,21 @@
 //! What came of a scan, and what can be done with it: all of it about the scan that is shown, not about what the form says.
 
-use super::again::Swapped;
-use super::form::order;
-use super::{About, Ask, Order, Scan, Stage, What};
-use crate::desk::Desk;
-use crate::place::Place;
-use crate::worker::Command;
-use crate::{texts::scan as texts, theme, widgets};
-use eframe::egui::{self, RichText};
+use crate::jobs::messages::Request;
+use crate::jobs::scan::{Command, Order, Swapped, What};
+use crate::jobs::state::AppState;
+use crate::model::project::Project;
+use crate::rooms::scan::form::order;
+use crate::rooms::scan::{About, Scan, Stage};
+use crate::texts::scan as texts;
+use crate::ui::{theme, widgets};
+use eframe::egui;
+use eframe::egui::RichText;
 use std::path::PathBuf;
 use weavelight::solution::Report;
 
 impl Scan {
     /// What came of the scan, and what to do with it.
-    pub(super) fn result(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    pub(super) fn result(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let name = self.about.as_ref().map_or("", |about| about.name.as_str());
         let (good, text) = match &self.stage {
             Stage::Scanned(Some(summary)) => (summary.warnings.is_empty(), texts::scanned(summary)),
@@ -27,57 +29,57 @@ impl Scan {
         ui.horizontal_wrapped(|ui| {
             sign.ui(ui);
             ui.label(RichText::new(text).strong());
-            self.next_steps(ui, desk);
+            self.next_steps(ui, app);
         });
     }
 
-    fn next_steps(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn next_steps(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         if let Stage::Solved { solution, .. } = &self.stage
             && ui.button(texts::LOOK_CLOSER).on_hover_text(texts::ENTER).clicked()
         {
-            desk.look_at(solution.clone());
+            app.look_at(solution.clone());
         }
-        if !desk.can_change() {
+        if !app.can_change() {
             return;
         }
         let folder = self.about.as_ref().and_then(|about| about.folder.clone());
-        let calibrated = desk.is_calibrated;
+        let calibrated = app.is_calibrated;
         if let (Stage::Scanned(_), Some(scan), true) = (&self.stage, folder, calibrated)
             && ui.button(texts::SOLVE).clicked()
         {
-            let settings = desk.settings.solve;
-            desk.ask(Command::Scan(Ask::Solve { scan, settings }));
+            let settings = app.settings.solve;
+            app.request(Request::Scan(Command::Solve { scan, settings }));
         }
-        if let Some(order) = self.again(desk)
+        if let Some(order) = self.again(app)
             && ui.button(texts::REPEAT).on_hover_text(texts::REPEAT_HINT).clicked()
         {
-            self.begin(order, desk);
+            self.begin(order, app);
         }
     }
 
     /// The order that takes the scan that is shown once more: as the form says, as long as that is still about this scan, else
     /// as it was taken. `None` where it is no scan of this rig.
-    fn again(&self, desk: &Desk) -> Option<Order> {
+    fn again(&self, app: &AppState) -> Option<Order> {
         let About { name, folder, order: taken } = self.about.as_ref()?;
         let scan: PathBuf = folder.clone()?;
-        let ours = |place: &Place| scan.parent() == Some(&place.scans());
-        if !desk.place.as_ref().is_some_and(ours) {
+        let ours = |place: &Project| scan.parent() == Some(&place.scans());
+        if !app.project.as_ref().is_some_and(ours) {
             return None;
         }
-        let form = order(desk);
+        let form = order(app);
         let how = if form.name == *name { form } else { taken.clone()? };
         Some(Order { name: name.clone(), what: What::Again(scan), ..how })
     }
 
     /// What was scanned again can be had back, as long as this room is about it.
-    pub(super) fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        let Some(replaced) = self.replaced.clone().filter(|_| desk.can_change()) else { return };
+    pub(super) fn offer_undo(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        let Some(replaced) = self.replaced.clone().filter(|_| app.can_change()) else { return };
         let frame = egui::Frame::group(ui.style()).fill(ui.visuals().faint_bg_color);
         frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.label(texts::replaced(&replaced.name));
             if ui.button(texts::UNDO).clicked() {
-                desk.ask(Command::Scan(Ask::Undo(replaced)));
+                app.request(Request::Scan(Command::Undo(replaced)));
             }
         });
         ui.add_space(theme::GAP);

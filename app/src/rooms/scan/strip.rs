@@ -1,10 +1,12 @@
 //! The strip of frames, filling as light after light fires.
 
-use super::Thumb;
 use crate::texts::scan as texts;
-use crate::theme::{self, meaning};
-use crate::widgets::Sign;
-use eframe::egui::{self, Rect, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, vec2};
+use crate::ui::theme;
+use crate::ui::theme::meaning;
+use crate::ui::widgets::Sign;
+use crate::viewer::picture::Thumb;
+use eframe::egui;
+use eframe::egui::{Rect, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, vec2};
 
 /// Of the strip, points.
 pub(super) const HEIGHT: f32 = 104.0;

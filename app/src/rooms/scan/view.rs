@@ -1,13 +1,16 @@
 //! The large picture: a test shot with its histogram and advice, or the maps as far as the frames go, under a lamp that the
 //! mouse carries.
 
-use super::histogram;
-use super::picture::test_shot;
-use crate::rooms::look::view::{
-    Appearance, Canvas, Geometry, MapView, Maps, Mode, first_lamp, lamp_over,
-};
+use crate::rooms::scan::histogram;
 use crate::texts::scan as texts;
-use eframe::egui::{self, PointerButton, RichText, TextureHandle, TextureOptions};
+use crate::viewer::appearance::{Appearance, Mode, first_lamp, lamp_over};
+use crate::viewer::canvas::Canvas;
+use crate::viewer::geometry::Geometry;
+use crate::viewer::map_view::MapView;
+use crate::viewer::maps::Maps;
+use crate::viewer::picture::test_shot;
+use eframe::egui;
+use eframe::egui::{PointerButton, RichText, TextureHandle, TextureOptions};
 use weavelight::device::scan;
 
 /// Longest side of a test shot on the screen, pixels.

@@ -1,75 +1,24 @@
 //! The Scans room: what was captured, newest first; search, open, solve again, export, delete to the bin.
 
-mod list;
-mod work;
-
-pub use list::{Deleted, Entry, Unfinished, incomplete};
-
-use crate::browse::Browse;
-use crate::desk::Desk;
-use crate::names::folder_name;
-use crate::place::Place;
-use crate::rooms::Room;
-use crate::settings::SolveSettings;
-use crate::worker::{Command, Outbox, Tools};
-use crate::{paths, texts::scans as texts, theme, widgets};
+use crate::jobs::messages::{Request, Update};
+use crate::jobs::scans::{Command, Deleted, Event};
+use crate::jobs::state::AppState;
+use crate::model::names::folder_name;
+use crate::model::paths;
+use crate::model::room::Room;
+use crate::model::scan_entry::ScanEntry;
+use crate::rooms::RoomPanel;
+use crate::texts::rooms;
+use crate::texts::scans as texts;
+use crate::ui::browse::Browse;
+use crate::ui::{theme, widgets};
+use eframe::egui;
 use eframe::egui::{
-    self, ColorImage, Key, Modifiers, RichText, Sense, TextureHandle, TextureOptions, vec2,
+    ColorImage, Key, Modifiers, RichText, Sense, TextureHandle, TextureOptions, vec2,
 };
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use weavelight::solution::Reuse;
-
-/// What this room asks of the worker.
-#[derive(Debug)]
-pub enum Ask {
-    /// What there is of a rig.
-    List(Box<Place>),
-    /// The picture of a scan of a rig.
-    Thumbnail(Box<Place>, PathBuf),
-    /// The solution of a scan.
-    Solve {
-        /// The capture session's folder.
-        scan: PathBuf,
-        /// How.
-        settings: SolveSettings,
-        /// Whether one that is up to date stays.
-        reuse: Reuse,
-    },
-    /// A scan and its solution into the system's bin.
-    Delete(Entry),
-    /// Out of the bin again.
-    BringBack(Deleted),
-    /// A copy of a solution.
-    Export {
-        /// The solution.
-        solution: PathBuf,
-        /// The folder to make; numbered on where it is there.
-        to: PathBuf,
-    },
-}
-
-/// What the worker tells this room.
-#[derive(Debug)]
-pub enum Told {
-    /// What there is of the rig in a folder.
-    List(PathBuf, Vec<Entry>),
-    /// The picture of a scan.
-    Thumbnail(PathBuf, ColorImage),
-    /// The solution of a scan stands; true where it did already.
-    Solved(PathBuf, bool),
-    /// A scan and its solution are in the bin.
-    Deleted(Deleted),
-    /// And out of it again.
-    BroughtBack(Deleted),
-    /// A solution was copied.
-    Exported {
-        /// The solution.
-        solution: PathBuf,
-        /// Where the copy is.
-        to: PathBuf,
-    },
-}
 
 /// Width of a card, points.
 const CARD: f32 = 208.0;
@@ -80,7 +29,7 @@ const PICTURE: f32 = 128.0;
 #[derive(Default)]
 pub struct Scans {
     /// `None` until they come.
-    entries: Option<Vec<Entry>>,
+    entries: Option<Vec<ScanEntry>>,
     search: String,
     chosen: Option<PathBuf>,
     /// It may be out of sight.
@@ -111,53 +60,84 @@ impl std::fmt::Debug for Scans {
     }
 }
 
+impl RoomPanel for Scans {
+    fn title(&self) -> &'static str {
+        rooms::SCANS
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        self.draw(ui, app);
+    }
+
+    fn hear(&mut self, update: Update, app: &mut AppState) {
+        if let Update::Scans(event) = update {
+            self.take_event(event, app);
+        }
+    }
+
+    fn enter(&mut self, _app: &mut AppState) {
+        self.fresh = false;
+    }
+
+    fn rig_opened(&mut self, _app: &mut AppState) {
+        *self = Self::default();
+    }
+
+    fn rig_released(&mut self, _app: &mut AppState) {
+        self.fresh = false;
+    }
+
+    fn job_ended(&mut self) {
+        self.fresh = false;
+    }
+}
+
 impl Scans {
-    /// Draws the room.
-    pub fn ui(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
-        if let Some(place) = desk.place.clone().filter(|_| !self.fresh) {
+    fn draw(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
+        if let Some(place) = app.project.clone().filter(|_| !self.fresh) {
             self.fresh = true;
-            desk.ask(Command::Scans(Ask::List(Box::new(place))));
+            app.request(Request::Scans(Command::List(Box::new(place))));
         }
         if let Some(entry) = self.chosen() {
             let pane = egui::Panel::right("scan details").exact_size(280.0).resizable(false);
-            pane.show(ui, |ui| self.details(ui, &entry, desk));
+            pane.show(ui, |ui| self.details(ui, &entry, app));
         }
-        egui::CentralPanel::default().show(ui, |ui| self.gallery(ui, desk));
+        egui::CentralPanel::default().show(ui, |ui| self.gallery(ui, app));
     }
 
     /// What was chosen, as long as the search does not hide it.
-    fn chosen(&self) -> Option<Entry> {
+    fn chosen(&self) -> Option<ScanEntry> {
         let chosen = self.chosen.as_ref()?;
         self.found().into_iter().find(|entry| entry.folder == *chosen)
     }
 
-    fn gallery(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn gallery(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         ui.horizontal(|ui| {
             ui.heading(crate::texts::rooms::SCANS);
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 self.search_field(ui);
             });
         });
-        self.offer_undo(ui, desk);
+        self.offer_undo(ui, app);
         let Some(entries) = &self.entries else {
             ui.label(RichText::new(texts::LISTING).weak());
             return;
         };
         if entries.is_empty() {
             if widgets::empty(ui, texts::NONE, texts::GO_SCAN) {
-                desk.go_to(Room::Scan);
+                app.go_to(Room::Scan);
             }
             return;
         }
         let found = self.found();
-        self.keys(ui, &found, desk);
+        self.keys(ui, &found, app);
         if found.is_empty() {
             ui.label(texts::nothing_found(&self.search));
         }
         egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             ui.horizontal_wrapped(|ui| {
                 ui.spacing_mut().item_spacing = vec2(theme::WIDE_GAP, theme::WIDE_GAP);
-                found.iter().for_each(|entry| self.card(ui, entry, desk));
+                found.iter().for_each(|entry| self.card(ui, entry, app));
             });
             widgets::reveal_focus(ui);
         });
@@ -185,9 +165,9 @@ impl Scans {
     }
 
     /// What was deleted last can be had again: with the button, or Control and Z.
-    fn offer_undo(&mut self, ui: &mut egui::Ui, desk: &mut Desk) {
+    fn offer_undo(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let Some(last) = self.deleted.last().cloned() else { return };
-        let idle = desk.can_change();
+        let idle = app.can_change();
         let clicked = ui.horizontal(|ui| {
             ui.label(texts::in_the_bin(&last.name));
             let undo = egui::Button::new(texts::UNDO);
@@ -196,18 +176,18 @@ impl Scans {
         let free = idle && !ui.ctx().egui_wants_keyboard_input();
         let key = free && ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z));
         if clicked.inner || key {
-            desk.ask(Command::Scans(Ask::BringBack(last)));
+            app.request(Request::Scans(Command::BringBack(last)));
         }
     }
 
-    fn found(&self) -> Vec<Entry> {
+    fn found(&self) -> Vec<ScanEntry> {
         let wanted = self.search.to_lowercase();
-        let fits = |entry: &&Entry| entry.name.to_lowercase().contains(&wanted);
+        let fits = |entry: &&ScanEntry| entry.name.to_lowercase().contains(&wanted);
         self.entries.iter().flatten().filter(fits).cloned().collect()
     }
 
     /// Arrows choose, Enter opens, Control and E exports, Delete deletes.
-    fn keys(&mut self, ui: &egui::Ui, found: &[Entry], desk: &mut Desk) {
+    fn keys(&mut self, ui: &egui::Ui, found: &[ScanEntry], app: &mut AppState) {
         if ui.ctx().egui_wants_keyboard_input() || found.is_empty() {
             return;
         }
@@ -223,24 +203,24 @@ impl Scans {
         let Some(entry) = at.map(|k| found[k].clone()) else { return };
         let export = ui.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::E));
         if pressed(Key::Enter) {
-            open(&entry, desk);
+            open(&entry, app);
         } else if let Some(solution) = entry.solution.clone().filter(|_| export) {
-            let to = export_folder(&entry, desk);
-            desk.ask(Command::Scans(Ask::Export { solution, to }));
-        } else if pressed(Key::Delete) && desk.can_change() {
+            let to = export_folder(&entry, app);
+            app.request(Request::Scans(Command::Export { solution, to }));
+        } else if pressed(Key::Delete) && app.can_change() {
             self.chosen = None;
-            desk.ask(Command::Scans(Ask::Delete(entry)));
+            app.request(Request::Scans(Command::Delete(entry)));
         }
     }
 
-    fn choose(&mut self, entry: &Entry) {
+    fn choose(&mut self, entry: &ScanEntry) {
         self.chosen = Some(entry.folder.clone());
         self.export_to.clear();
         self.said = None;
         self.up_to_date = None;
     }
 
-    fn card(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+    fn card(&mut self, ui: &mut egui::Ui, entry: &ScanEntry, app: &mut AppState) {
         let (rect, response) = ui.allocate_exact_size(vec2(CARD, PICTURE + 44.0), Sense::click());
         let label = format!("{}, {}", entry.name, texts::state(entry));
         let info = || egui::WidgetInfo::labeled(egui::Role::Button, true, label.clone());
@@ -258,7 +238,7 @@ impl Scans {
         painter.rect_filled(rect, 6.0, fill);
         let picture = egui::Rect::from_min_size(rect.min, vec2(CARD, PICTURE)).shrink(4.0);
         painter.rect_filled(picture, 4.0, visuals.extreme_bg_color);
-        if let Some(texture) = self.texture(ui.ctx(), entry, desk) {
+        if let Some(texture) = self.texture(ui.ctx(), entry, app) {
             let scale = (picture.size() / texture.size_vec2()).min_elem();
             let place = egui::Rect::from_center_size(picture.center(), texture.size_vec2() * scale);
             let all = egui::Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
@@ -271,7 +251,7 @@ impl Scans {
         text(at(4.0), &entry.name, 14.0, visuals.text_color());
         text(at(23.0), &texts::state(entry), 12.0, visuals.weak_text_color());
         if response.double_clicked() {
-            open(entry, desk);
+            open(entry, app);
         } else if response.clicked() {
             self.choose(entry);
         }
@@ -280,13 +260,13 @@ impl Scans {
     fn texture(
         &mut self,
         ctx: &egui::Context,
-        entry: &Entry,
-        desk: &mut Desk,
+        entry: &ScanEntry,
+        app: &mut AppState,
     ) -> Option<TextureHandle> {
         let picture = self.pictures.entry(entry.folder.clone()).or_insert_with(|| {
-            let place = desk.place.clone().map(Box::new);
+            let place = app.project.clone().map(Box::new);
             if let Some(place) = place {
-                desk.ask(Command::Scans(Ask::Thumbnail(place, entry.folder.clone())));
+                app.request(Request::Scans(Command::Thumbnail(place, entry.folder.clone())));
             }
             Picture::Asked
         });
@@ -300,7 +280,7 @@ impl Scans {
         }
     }
 
-    fn details(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+    fn details(&mut self, ui: &mut egui::Ui, entry: &ScanEntry, app: &mut AppState) {
         ui.heading(&entry.name);
         egui::Grid::new("details").num_columns(2).show(ui, |ui| {
             for (what, value) in texts::details(entry) {
@@ -311,26 +291,26 @@ impl Scans {
         });
         ui.separator();
         ui.with_layout(egui::Layout::top_down_justified(egui::Align::Min), |ui| {
-            let idle = desk.can_change();
+            let idle = app.can_change();
             if ui.add_enabled(entry.solution.is_some(), egui::Button::new(texts::OPEN)).clicked() {
-                open(entry, desk);
+                open(entry, app);
             }
-            self.solve(ui, entry, desk);
+            self.solve(ui, entry, app);
             let delete = egui::Button::new(texts::delete(&entry.name)).truncate();
             if ui.add_enabled(idle, delete).on_hover_text(texts::DELETE_HINT).clicked() {
-                desk.ask(Command::Scans(Ask::Delete(entry.clone())));
+                app.request(Request::Scans(Command::Delete(entry.clone())));
                 self.chosen = None;
             }
         });
         if let Some(solution) = &entry.solution {
             ui.separator();
-            self.export(ui, solution, entry, desk);
+            self.export(ui, solution, entry, app);
         }
     }
 
-    fn solve(&mut self, ui: &mut egui::Ui, entry: &Entry, desk: &mut Desk) {
+    fn solve(&mut self, ui: &mut egui::Ui, entry: &ScanEntry, app: &mut AppState) {
         let again = if entry.solution.is_some() { texts::SOLVE_AGAIN } else { texts::SOLVE };
-        let can = desk.can_change() && entry.frames[0] > 0;
+        let can = app.can_change() && entry.frames[0] > 0;
         let mut reuse = None;
         if ui.add_enabled(can, egui::Button::new(again)).clicked() {
             reuse = Some(Reuse::IfCurrent);
@@ -342,15 +322,21 @@ impl Scans {
             }
         }
         if let Some(reuse) = reuse {
-            let (scan, settings) = (entry.folder.clone(), desk.settings.solve);
+            let (scan, settings) = (entry.folder.clone(), app.settings.solve);
             self.up_to_date = None;
-            desk.ask(Command::Scans(Ask::Solve { scan, settings, reuse }));
+            app.request(Request::Scans(Command::Solve { scan, settings, reuse }));
         }
     }
 
-    fn export(&mut self, ui: &mut egui::Ui, solution: &Path, entry: &Entry, desk: &mut Desk) {
+    fn export(
+        &mut self,
+        ui: &mut egui::Ui,
+        solution: &Path,
+        entry: &ScanEntry,
+        app: &mut AppState,
+    ) {
         if self.export_to.is_empty() {
-            self.export_to = export_folder(entry, desk).display().to_string();
+            self.export_to = export_folder(entry, app).display().to_string();
         }
         let label = ui.label(texts::EXPORT_TO);
         let width = ui.available_width();
@@ -360,12 +346,12 @@ impl Scans {
             if let Some(folder) = self.browse.folder(ui) {
                 self.export_to = folder.join(export_name(entry)).display().to_string();
             }
-            let free = !desk.is_busy();
+            let free = !app.is_busy();
             let clicked = ui.add_enabled(free, egui::Button::new(texts::EXPORT)).clicked();
             let to = paths::typed(&self.export_to).filter(|_| clicked || (entered && free));
             if let Some(to) = to {
                 let solution = solution.to_owned();
-                desk.ask(Command::Scans(Ask::Export { solution, to }));
+                app.request(Request::Scans(Command::Export { solution, to }));
             }
         });
         if let Some((_, said)) = self.said.as_ref().filter(|(of, _)| of == solution) {
@@ -373,67 +359,52 @@ impl Scans {
         }
     }
 
-    /// Takes in what the worker tells.
-    pub fn hear(&mut self, told: Told, desk: &mut Desk) {
-        match told {
-            Told::List(of, entries) => {
-                if desk.place.as_ref().is_some_and(|place| place.folder == of) {
+    fn take_event(&mut self, event: Event, app: &mut AppState) {
+        match event {
+            Event::List(of, entries) => {
+                if app.project.as_ref().is_some_and(|place| place.folder == of) {
                     self.take(entries);
                 }
             }
-            Told::Thumbnail(folder, picture) => {
+            Event::Thumbnail(folder, picture) => {
                 self.pictures.insert(folder, Picture::Here(picture));
             }
-            Told::Deleted(entry) => self.deleted.push(entry),
-            Told::BroughtBack(deleted) => {
+            Event::Deleted(entry) => self.deleted.push(entry),
+            Event::BroughtBack(deleted) => {
                 self.deleted.retain(|other| *other != deleted);
                 self.chosen = Some(deleted.folder);
                 (self.said, self.up_to_date) = (None, None);
                 self.export_to.clear();
             }
-            Told::Solved(scan, up_to_date) => self.up_to_date = up_to_date.then_some(scan),
-            Told::Exported { solution, to } => self.said = Some((solution, texts::exported(&to))),
+            Event::Solved(scan, up_to_date) => self.up_to_date = up_to_date.then_some(scan),
+            Event::Exported { solution, to } => self.said = Some((solution, texts::exported(&to))),
         }
     }
 
     /// A scan that was taken again has another picture.
-    fn take(&mut self, entries: Vec<Entry>) {
+    fn take(&mut self, entries: Vec<ScanEntry>) {
         for entry in self.entries.iter().flatten() {
-            let same = |new: &Entry| new.folder == entry.folder && new.captured == entry.captured;
+            let same =
+                |new: &ScanEntry| new.folder == entry.folder && new.captured == entry.captured;
             if !entries.iter().any(same) {
                 self.pictures.remove(&entry.folder);
             }
         }
         self.entries = Some(entries);
     }
-
-    /// Another rig, or another set of scans.
-    pub fn reset(&mut self, _desk: &mut Desk) {
-        *self = Self::default();
-    }
-
-    /// The list may have changed.
-    pub fn is_stale(&mut self) {
-        self.fresh = false;
-    }
 }
 
 /// Where the maps go if nobody says otherwise.
-fn export_folder(entry: &Entry, desk: &Desk) -> PathBuf {
-    desk.settings.home.join("exports").join(export_name(entry))
+fn export_folder(entry: &ScanEntry, app: &AppState) -> PathBuf {
+    app.settings.home.join("exports").join(export_name(entry))
 }
 
-fn export_name(entry: &Entry) -> String {
+fn export_name(entry: &ScanEntry) -> String {
     format!("{} maps", folder_name(&entry.name))
 }
 
-fn open(entry: &Entry, desk: &mut Desk) {
+fn open(entry: &ScanEntry, app: &mut AppState) {
     if let Some(solution) = &entry.solution {
-        desk.look_at(solution.clone());
+        app.look_at(solution.clone());
     }
-}
-
-/// The worker's part.
-pub fn act(ask: Ask, tools: &mut Tools, out: &Outbox) {
-    work::act(ask, tools, out);
 }
