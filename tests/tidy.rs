@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot read its own tree has failed")]
 
+#[path = "tidy/app.rs"]
+mod app;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -80,7 +80,7 @@ fn a_test_shot_shows_exposure_and_focus() {
         window.open_small_rig();
         window.enter(Room::Scan);
         window.click("Test shot");
-        window.until_label("Mark what clips");
+        window.until_label("Mark clipped pixels");
         window.idle();
     });
 }
@@ -93,10 +93,10 @@ fn a_scan_that_was_stopped_is_offered_and_continued() {
     window.click("Scan the swatch");
     window.until_label("Light 2, taken");
     window.click("Stop");
-    window.until_label("Continue it");
+    window.until_label("Continue scan");
     window.idle();
     assert!(window.harness.state().shared().problems.is_empty(), "stopping is no fault");
-    window.click("Continue it");
+    window.click("Continue scan");
     window.until_label("Look closer");
 }
 
@@ -117,8 +117,8 @@ fn a_fault_in_the_middle_is_told_and_the_scan_goes_on_later() {
     window.enter(Room::Rig);
     window.open_small_rig();
     window.enter(Room::Scan);
-    window.until_label("Continue it");
-    window.click("Continue it");
+    window.until_label("Continue scan");
+    window.click("Continue scan");
     window.until_label("Look closer");
 }
 
@@ -139,7 +139,7 @@ fn a_frame_that_clips_is_marked_and_the_remedy_named() {
         window.open_small_rig();
         window.enter(Room::Scan);
         window.click("Test shot");
-        window.click("Mark what clips");
+        window.click("Mark clipped pixels");
         window.idle();
     });
 }
@@ -154,7 +154,7 @@ fn a_scan_that_was_killed_is_the_first_thing_to_be_seen() {
             window.killed_scan("linen 1", 4);
             window.open_small_rig();
             window.enter(Room::Scan);
-            window.until_label("Continue it");
+            window.until_label("Continue scan");
             window.idle();
         },
     );
@@ -170,7 +170,7 @@ fn a_rig_without_calibration_leads_to_it() {
             std::fs::remove_dir_all(window.rig().join("calibration")).unwrap();
             window.open_small_rig();
             window.enter(Room::Scan);
-            window.until_label("Calibrate it");
+            window.until_label("Calibrate the rig");
             window.idle();
         },
     );
@@ -190,7 +190,7 @@ fn an_old_calibration_is_told_where_it_is_used() {
             std::fs::write(&file, text).unwrap();
             window.open_small_rig();
             window.enter(Room::Scan);
-            window.until_label("Go and check it");
+            window.until_label("Check calibration");
             window.idle();
         },
     );

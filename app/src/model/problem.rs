@@ -30,7 +30,7 @@ pub enum Area {
     Look,
     /// The gallery of scans.
     Scans,
-    /// Keeping the settings.
+    /// Saving the settings.
     Settings,
 }
 

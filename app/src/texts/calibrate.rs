@@ -1,5 +1,7 @@
 //! The Calibrate room.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 use weavelight::calibrate::wizard::{BOARDS, Entry, Kept, Pose, State, Step, Task};
 use weavelight::calibrate::{Action, SeenSheet};
 
@@ -9,32 +11,26 @@ pub const TAKE: &str = "Take the picture (Space)";
 pub const FIT: &str = "Calculate (Space)";
 /// The button that takes a test shot.
 pub const LOOK: &str = "Live";
-/// What that does.
-pub const LOOK_HINT: &str = "Looks again and again, with what is found drawn over the picture, until it is switched off; nothing is kept";
+pub const LOOK_HINT: &str = "Takes test shots continuously and marks what is found; keeps nothing";
 /// Where that was ended.
-pub const NOT_LOOKED: &str = "Nobody has looked at the pictures of this rig's calibration yet";
-/// The way out.
-pub const LOOK_NOW: &str = "Look at them";
+pub const NOT_LOOKED: &str = "The pictures of this rig's calibration have not been checked yet";
+pub const LOOK_NOW: &str = "Check them";
 /// The button that goes on by itself.
-pub const AUTO: &str = "Do the rest by itself";
-/// What that does.
-pub const AUTO_HINT: &str = "The simulated rig lays and photographs every target that is left";
+pub const AUTO: &str = "Finish automatically";
+pub const AUTO_HINT: &str = "The simulated rig places and photographs all remaining targets";
 /// The button that ends that.
 pub const STOP: &str = "Stop";
 /// The button that begins everything anew.
-pub const ANEW: &str = "Calibrate anew";
-/// What that does.
+pub const ANEW: &str = "Recalibrate";
 pub const ANEW_HINT: &str =
-    "The calibration stays in use until each part is made anew, and goes into the history";
+    "The calibration stays in use until each part is replaced; the old one goes into the history";
 /// The button that takes a step's pictures again.
 pub const AGAIN: &str = "Again";
-/// What that does.
 pub const AGAIN_HINT: &str =
-    "Take the pictures of this step again; those there are go into the folder “history” of the rig";
+    "Take the pictures of this step again; the old ones move to the rig's folder “history”";
 /// The button that begins a check.
 pub const CHECK: &str = "Check now";
-/// What that does.
-pub const CHECK_HINT: &str = "Photograph a tilted sheet that the calibration has not seen";
+pub const CHECK_HINT: &str = "Photograph a tilted sheet that is not used for the calibration";
 /// The button that leaves the check for another day.
 pub const NOT_NOW: &str = "Not now";
 /// Name of the picture.
@@ -42,44 +38,37 @@ pub const LAST_PICTURE: &str = "What the camera saw";
 /// Before the first picture.
 pub const NOTHING_YET: &str = "The picture appears here, with what is found in it.";
 /// On a simulated rig.
-pub const SIMULATED: &str = "This rig is simulated: the program lays the target there for you. Take each picture, or let it do the rest.";
+pub const SIMULATED: &str = "This rig is simulated: the program places the targets for you. Take each picture, or finish automatically.";
 /// A build without OpenCV.
-pub const NO_CHESSBOARDS: &str = "This window was built without OpenCV and cannot see chessboards, which the camera is calibrated with. Install a Weavelight that was built with it, or build it so (the README says how), and open this rig again. Scans with a calibration that is there already work as before.";
-/// The board's shape.
+pub const NO_CHESSBOARDS: &str = "This window was built without OpenCV and cannot detect chessboards, which the camera calibration needs. Install or build Weavelight with OpenCV (the README says how), and open this rig again. Scanning with an existing calibration still works.";
 pub const BOARD: &str = "Inner corners";
-/// The strip's shape.
 pub const STRIP: &str = "Strip beside the sheet: inner corners";
-/// Of either.
 pub const SQUARES: &str = "squares of";
 /// The light that boards are photographed under.
 pub const LIGHT: &str = "under light";
-/// The chart's file.
 pub const CHART: &str = "Chart file";
-/// What it holds.
 pub const CHART_HINT: &str = "A TOML file with schema = 1 and [[target.patches]]: where each patch lies in the picture, and its colour";
 /// Where it is missing.
-pub const NO_CHART: &str = "the chart is not described: name its file above the button; it lists every patch as [[target.patches]], as a session.toml does";
-/// The sheet's reflectance.
+pub const NO_CHART: &str = "no chart file is chosen; choose one above the button (it lists every patch as [[target.patches]], like a session.toml)";
 pub const REFLECTANCE: &str = "Reflectance";
 /// The raised sheet's height.
 pub const RAISED: &str = "Height over the table";
 /// Before the note on a picture that is not of the task in hand.
 pub const LAST: &str = "The last picture:";
-/// No calibration yet.
 pub const NEVER: &str = "Not calibrated yet.";
 /// The limit of age.
 pub const EXPIRES: &str = "Counts as old after";
 /// The heading of earlier calibrations and pictures.
 pub const HISTORY: &str = "History";
 /// While things are put there.
-pub const PUTTING_AWAY: &str = "Putting what is there into the history";
+pub const PUTTING_AWAY: &str = "Moving the old pictures into the history";
 /// Where there is nothing.
 pub const NO_HISTORY: &str =
     "Empty. Earlier calibrations, and pictures that are taken again, are kept here.";
 /// The button that leads on.
-pub const SCAN: &str = "Go and scan";
+pub const SCAN: &str = "Start scanning";
 /// While pictures are looked at.
-pub const LOOKING: &str = "Looking at the pictures";
+pub const LOOKING: &str = "Checking the pictures";
 /// While a test shot is taken.
 pub const TAKING_LOOK: &str = "Test shot";
 /// While the exposure is found.
@@ -89,7 +78,8 @@ pub const BOARD_LOST: &str = "the light board is gone; plug it in again";
 /// A picture without a board.
 pub const BOARD_NOT_FOUND: &str = "The board was not found: it must be whole, sharp and evenly lit in the picture. Take another one.";
 /// A sheet that cannot serve.
-pub const SHEET_REFUSED: &str = "This sheet cannot serve; the panel below says why. Take it again.";
+pub const SHEET_REFUSED: &str =
+    "This sheet cannot be used; the problem list says why. Take it again.";
 
 /// Names of the steps.
 pub fn step(step: Step) -> &'static str {
@@ -107,7 +97,7 @@ pub fn what(step: Step) -> &'static str {
         Step::Camera => "Lens, sensor and table, from a chessboard",
         Step::Color => "Levels and colour, from a chart",
         Step::Lights => "Where the lights are, from a white sheet",
-        Step::Check => "A sheet that the fit has not seen",
+        Step::Check => "A sheet that was not used for the fit",
     }
 }
 
@@ -154,22 +144,22 @@ fn place([column, row]: [usize; 2]) -> &'static str {
 /// And how, in a sentence or two.
 pub fn how(task: Task, state: &State, simulated: bool) -> String {
     match task {
-        Task::Table => "Its columns run along the picture, the whole board is in it. This picture says where the table is; then press Space.".to_owned(),
+        Task::Table => "Align its columns with the picture and keep the whole board in view. This picture defines the table. Then press Space.".to_owned(),
         Task::Board => format!(
-            "Tilt it by 20 to 40 degrees, another way than before, and bring it to {} of the picture. Then press Space.",
+            "Tilt it by 20 to 40 degrees, in another direction than before, and move it to {} of the picture. Then press Space.",
             place(state.emptiest())
         ),
-        Task::Chart => "Where its patches are stated to be. It is photographed under every light, and under one at several exposures.".to_owned(),
-        Task::Sheet(Pose::Flat) => "Smooth, clean, and over the whole picture. It is photographed under every light; do not touch it until then.".to_owned(),
-        Task::Sheet(Pose::Raised) => "Level, on blocks, about 100 mm over the table. Two heights tell how far the lights are.".to_owned(),
+        Task::Chart => "Place it where the chart file says. It is photographed under every light, and under one light at several exposures.".to_owned(),
+        Task::Sheet(Pose::Flat) => "It must be smooth and clean, and cover the whole picture. It is photographed under every light; do not touch it meanwhile.".to_owned(),
+        Task::Sheet(Pose::Raised) => "Level, on blocks, about 100 mm above the table. Two heights determine how far away the lights are.".to_owned(),
         Task::Sheet(Pose::Tilt(k)) => format!(
-            "Prop it up by about 20 degrees so that it faces {}{}. Tilts tell where the lights are.",
+            "Prop it up by about 20 degrees so that it faces {}{}. Tilted sheets determine where the lights are.",
             ["the upper right", "the upper left", "the lower left", "the lower right"][k.min(3)],
             if simulated { "" } else { ", with the whole strip in the picture" }
         ),
-        Task::Sheet(Pose::Check) => "Prop it up so that it faces the top of the picture. The calibration has not seen this sheet: what it makes of it tells how good it is.".to_owned(),
+        Task::Sheet(Pose::Check) => "Prop it up so that it faces the top of the picture. This sheet is not used for the calibration, so it shows how good the calibration is.".to_owned(),
         Task::Fit(_) => "The calculation was stopped or failed. Start it again, or take the pictures of this step again.".to_owned(),
-        Task::Done => "Scans are solved with this calibration from now on.".to_owned(),
+        Task::Done => "Scans are now solved with this calibration.".to_owned(),
     }
 }
 
@@ -278,14 +268,14 @@ fn about_mm(mm: f64) -> String {
 /// How well the lights' places would be known if the work ended here.
 pub fn foreseen_now(sheets: usize, mm: f64) -> String {
     match sheets {
-        0 => format!("The ruler knows where the lights are within {}", about_mm(mm)),
-        _ => format!("Finished now, the lights' places would be known within {}", about_mm(mm)),
+        0 => format!("Light positions by the ruler: within {}", about_mm(mm)),
+        _ => format!("Light positions with these sheets: within {}", about_mm(mm)),
     }
 }
 
 /// And with one sheet more.
 pub fn foreseen_then(mm: f64) -> String {
-    format!("This sheet should bring that to {}; below 1 mm is good", about_mm(mm))
+    format!("This sheet should improve that to {}; below 1 mm is good", about_mm(mm))
 }
 
 /// What came of the camera.
@@ -317,17 +307,17 @@ pub fn check_figures(passed: bool, rms_deg: f64, limit_deg: f64) -> String {
 /// Of the check, in a sentence.
 pub fn verdict(passed: bool) -> &'static str {
     if passed {
-        "A sheet that the calibration has not seen is solved right."
+        "A sheet that was not used for the calibration is solved correctly."
     } else {
-        "A sheet that the calibration has not seen is solved wrong; photograph the sheets again, clean, flat and at rest."
+        "A sheet that was not used for the calibration is solved incorrectly; photograph the sheets again: clean, flat and still."
     }
 }
 
 /// How well the lights' places are known, now and after what is advised.
 pub fn sigma(now_mm: f64, then_mm: Option<f64>) -> String {
-    let then =
-        then_mm.map_or(String::new(), |then| format!(", {then:.2} mm after what is advised below"));
-    format!("The lights' places are known within {now_mm:.2} mm{then}.")
+    let then = then_mm
+        .map_or(String::new(), |then| format!(", {then:.2} mm after the step advised below"));
+    format!("Light positions are known within {now_mm:.2} mm{then}.")
 }
 
 /// What would make it better; `begun`: its pictures are here, so that single steps can be taken again;
@@ -339,30 +329,30 @@ pub fn better(action: &Action, begun: bool, checked: bool) -> String {
     };
     match action {
         Action::Boards | Action::BetterBoards => format!(
-            "What would improve it most: more pictures of the chessboard, sharp and whole, tilted by 20 to 40 degrees and out to the corners. {}.",
+            "Best improvement: more pictures of the chessboard, sharp and whole, tilted by 20 to 40 degrees and out to the corners. {}.",
             again(Step::Camera)
         ),
         Action::Chart => {
-            format!("What would improve it most: pictures of the chart. {}.", again(Step::Color))
+            format!("Best improvement: pictures of the chart. {}.", again(Step::Color))
         }
         Action::ColorChart => format!(
-            "What would improve it most: a colour chart whose file states the colour of every patch (lab_d50). {}.",
+            "Best improvement: a colour chart whose file states the colour of every patch (lab_d50). {}.",
             again(Step::Color)
         ),
         Action::FlatSheet | Action::MoreSheets => format!(
-            "What would improve it most: the white sheet flat, raised and tilted. {}.",
+            "Best improvement: the white sheet flat, raised and tilted. {}.",
             again(Step::Lights)
         ),
         Action::Sheet(pose) => format!(
-            "What would improve it most: a white sheet {pose}. {}, and lay one of the sheets like that.",
+            "Best improvement: a white sheet {pose}. {}, and lay one of the sheets like that.",
             again(Step::Lights)
         ),
         Action::LightsAgain => format!(
-            "The camera was calibrated after the lights, whose places still stand in its old frame. {}.",
+            "The camera was calibrated after the lights, so the light positions belong to its old frame. {}.",
             again(Step::Lights)
         ),
         Action::Check => format!(
-            "Nothing is left to improve. Press “{}” beside {} from time to time: a sheet that the calibration has not seen tells whether it still holds.",
+            "Nothing is left to improve. Press “{}” beside {} from time to time: a sheet that was not used for the calibration shows whether it still holds.",
             if checked { AGAIN } else { CHECK },
             step(Step::Check)
         ),
@@ -386,7 +376,7 @@ pub fn age(days: i64) -> String {
 /// Too old.
 pub fn expired(days: i64) -> String {
     format!(
-        "Calibrated {days} days ago: LEDs age and stands get moved. Check it on a tilted sheet, or calibrate anew."
+        "Calibrated {days} days ago: LEDs age and stands move. Check it with a tilted sheet, or recalibrate."
     )
 }
 
@@ -398,7 +388,7 @@ pub fn where_kept(name: &str) -> String {
 /// That it is there.
 pub fn kept(name: &str) -> String {
     format!(
-        "What was there before is kept in the rig's folder, under {}; History takes it back.",
+        "The previous files are kept in the rig's folder, under {}; restore them under History.",
         where_kept(name)
     )
 }

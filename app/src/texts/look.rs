@@ -61,7 +61,7 @@ pub const ANGLE: &str = "Angle between the normals";
 pub const RESIDUAL: &str = "Measured − predicted";
 pub const DIFFERENCE: &str = "Difference, of white";
 pub const FRAMES_MISSING: &str = "No frames";
-pub const NO_FRAMES: &str = "Its report does not say where the scan is, and this rig has none of its name. Solve the scan again to see its frames.";
+pub const NO_FRAMES: &str = "Its report does not say where the scan is, and this rig has no scan of its name. Solve the scan again to see its frames.";
 pub const NO_CALIBRATION: &str = "The calibration that it was solved with is gone, and this rig has none. Calibrate, or put it back, to see the frames.";
 pub const OTHER_GRID: &str =
     "These maps were undistorted; the frames lie on another grid. Solve without it to see them.";
@@ -74,7 +74,7 @@ pub const HEIGHT: &str = "Height";
 pub const DRAG_LAMP: &str = "Drag it over the cloth; Shift and wheel: its height.";
 pub const ELEVATION: &str = "Elevation";
 pub const AZIMUTH: &str = "Direction";
-pub const MOVES: &str = "Let it go round";
+pub const MOVES: &str = "Rotate";
 pub const BRIGHTNESS: &str = "Brightness";
 pub const GLOSS: &str = "Gloss";
 pub const BESIDE_FRAME: &str = "Beside its captured frame";
@@ -82,7 +82,7 @@ pub const NO_FRAME: &str = "This light has no frame.";
 
 pub const PHOTOSITE: &str = "Photosite";
 pub const POINT_AT: &str = "Point at the cloth.";
-pub const CLICK_FOR_LIGHTS: &str = "Click it to see which lights it rests on.";
+pub const CLICK_FOR_LIGHTS: &str = "Click it to see which lights were used.";
 pub const LOUPE: &str = "Loupe";
 pub const PIXEL: &str = "Pixel";
 pub const PLACE: &str = "Place";
@@ -90,7 +90,7 @@ pub const NORMAL: &str = "Normal";
 pub const ALBEDO: &str = "Albedo";
 pub const ERROR: &str = "± error";
 pub const UNSOLVED: &str = "not solved";
-pub const SOLVING_AGAIN: &str = "Asking the frames…";
+pub const SOLVING_AGAIN: &str = "Reading the frames…";
 pub const NOT_SOLVED_AGAIN: &str = "The frames could not be read.";
 pub const FRAMES_CHANGED: &str = "Scan or calibration changed since it was solved.";
 pub const LIGHT_COLUMNS: [&str; 4] = ["Light", "Measured", "Fit", ""];
@@ -116,17 +116,17 @@ pub const ALL: &str = "Keep all";
 pub const NONE: &str = "Leave all out";
 pub const SAVE_AND_SOLVE: &str = "Save and solve again";
 pub const PAINT_FIRST: &str = "Paint what is to be solved first.";
-pub const NO_MASK: &str = "A mask belongs to the frames, and these are not here.";
-pub const KEPT_ALREADY: &str = "That changed nothing: it is kept already. Choose Leave out.";
-pub const LEFT_OUT_ALREADY: &str = "That changed nothing: it is left out already. Choose Keep.";
+pub const NO_MASK: &str = "A mask needs the frames, which are missing.";
+pub const KEPT_ALREADY: &str = "No change: this is kept already. Choose Leave out.";
+pub const LEFT_OUT_ALREADY: &str = "No change: this is left out already. Choose Keep.";
 pub const DRAFT_IS_BACK: &str =
-    "strokes that were not saved are back; save them, or take them back with Undo";
+    "unsaved strokes were restored; save them, or remove them with Undo";
 pub const KEEPING_STROKES: &str = "Keeping unsaved strokes";
 pub const SHOW_IT: &str = "Show it";
 pub const SOLVE_IT: &str = "Solve it";
 pub const NOT_NOW: &str = "Not now";
-pub const PIN: &str = "Stay with this one";
-pub const PIN_HINT: &str = "It stays when another scan is solved";
+pub const PIN: &str = "Keep this one open";
+pub const PIN_HINT: &str = "It stays open when another scan is solved";
 pub const OPENING_FOLDER: &str = "Opening the folder";
 pub const SAVING_MASK: &str = "Saving the mask";
 pub const READING_FRAMES: &str = "Reading the frames";
@@ -210,7 +210,7 @@ pub fn line_figures(length_mm: f64, rise_mm: f64) -> String {
 }
 
 pub fn frames_gone(folder: &Path) -> String {
-    format!("Its scan is not at {} any more. Put it back, or solve it again.", folder.display())
+    format!("Its scan is no longer at {}. Put it back, or solve it again.", folder.display())
 }
 
 pub fn reduced(scale: usize) -> String {

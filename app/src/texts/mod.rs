@@ -1,5 +1,7 @@
 //! Every word that the window says, by room; what goes wrong is told in the library's own words.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 pub mod calibrate;
 pub mod look;
 pub mod rig;
@@ -10,16 +12,15 @@ pub mod settings;
 pub mod shell;
 pub mod welcome;
 
-/// The window's title.
 pub const TITLE: &str = "Weavelight";
 /// Where the program itself is at fault.
-pub const BUG: &str = "the program stumbled over itself; nothing was lost. Please try again, and report it if it comes back";
+pub const BUG: &str =
+    "internal error; no data was lost. Please try again, and report it if it happens again";
 /// The button that opens the system's folder dialogue.
 pub const BROWSE: &str = "Browse…";
-/// What is remembered.
 pub const SETTINGS: &str = "Settings";
 /// Where they cannot be kept.
-pub const KEEPING_SETTINGS: &str = "Keeping the settings";
+pub const KEEPING_SETTINGS: &str = "Saving the settings";
 /// The button that ends work.
 pub const CANCEL: &str = "Cancel";
 /// The button that puts a problem away.
@@ -34,16 +35,14 @@ pub const PROBLEMS: &str = "Problems";
 pub const FAILED: &str = "failed";
 /// The menu of colours and sizes.
 pub const VIEW: &str = "View";
-/// Light and dark.
-pub const THEMES: [&str; 3] = ["As the system", "Light", "Dark"];
-/// Size of everything.
+pub const THEMES: [&str; 3] = ["System", "Light", "Dark"];
 pub const SCALE: &str = "Size";
 
 /// Keys and what they do.
 pub const KEYS: [(&str, &str); 9] = [
     ("Space     ", "scan, or take the picture"),
     ("Arrows    ", "choose a scan"),
-    ("Enter     ", "look at it"),
+    ("Enter     ", "open it"),
     ("Ctrl+E    ", "export its maps"),
     ("Delete    ", "move it to the bin"),
     ("Ctrl+Z    ", "undo"),
@@ -55,7 +54,9 @@ pub const KEYS: [(&str, &str); 9] = [
 /// Where the settings could not be read.
 pub fn settings_put_aside(file: &std::path::Path) -> String {
     let file = file.display();
-    format!("the settings could not be read, so the window begins anew; they are kept in {file}")
+    format!(
+        "the settings could not be read, so the defaults are used; the old file is kept as {file}"
+    )
 }
 
 /// Time left, in words.

@@ -1,5 +1,7 @@
 //! The Rig room.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 use weavelight::doctor::LightBoard;
 use weavelight::instrument::{CameraKind, RigCamera};
 
@@ -9,42 +11,27 @@ pub const NONE_OPEN: &str = "no rig is open; open one in the Rig room";
 pub const OPENING: &str = "Opening the rig";
 /// And when a simulated one is made.
 pub const MAKING_SIMULATED: &str = "Making the simulated rig";
-/// The button.
 pub const FIND: &str = "Look for board and camera";
-/// What it does.
-pub const FIND_HINT: &str = "Asks at the rig's port and at the camera; nothing is photographed";
-/// Before that.
-pub const NOT_LOOKED: &str = "Not looked for yet.";
-/// Work.
+pub const FIND_HINT: &str = "Checks the rig's port and the camera; takes no picture";
+pub const NOT_LOOKED: &str = "Not checked yet.";
 pub const FINDING: &str = "Looking for board and camera";
-/// Work.
 pub const FINDING_BOARD: &str = "light board";
-/// Work.
 pub const FINDING_CAMERA: &str = "camera";
-/// Work.
 pub const LIGHTING: &str = "Switching the light";
-/// Work.
 pub const TESTING: &str = "Testing each light";
 /// Back to the welcome.
 pub const OTHER_RIG: &str = "Open another rig";
-/// The heading.
 pub const LIGHTS: &str = "Lights";
-/// The button.
 pub const TEST_EACH: &str = "Test each";
-/// The button.
 pub const ALL_OFF: &str = "All off";
-/// How to.
 pub const CLICK_A_LIGHT: &str = "Click a light to switch it on; click it again to switch it off.";
-/// Of the table.
-pub const COLUMNS: [&str; 4] = ["Light", "Output", "By the ruler, mm", "Calibrated, mm"];
+pub const COLUMNS: [&str; 4] = ["Light", "Output", "Ruler, mm", "Calibrated, mm"];
 /// In place of a place.
 pub const FAR: &str = "far away";
 
 /// Who else works with the rig.
 pub fn held(holder: &str) -> String {
-    format!(
-        "This rig is in use by {holder}. It can be looked at; scanning and changes wait until that is done."
-    )
+    format!("This rig is in use by {holder}. You can view it; scanning and changes have to wait.")
 }
 
 /// A scan that belongs to no rig.
@@ -71,7 +58,7 @@ pub fn calibration(folder: &std::path::Path) -> String {
 /// Nothing that the program knows.
 pub fn unknown(path: &std::path::Path) -> String {
     format!(
-        "{} is no rig (rig.toml), scan (session.toml) or solution (report.json); drop one of their folders",
+        "{} is not a rig (rig.toml), scan (session.toml) or solution (report.json); drop the folder of one",
         path.display()
     )
 }
@@ -79,9 +66,7 @@ pub fn unknown(path: &std::path::Path) -> String {
 /// Where the rig was that was open last.
 pub fn gone(rig: &std::path::Path) -> String {
     let rig = rig.display();
-    format!(
-        "{rig} is not there any more; connect its disk and start again, or open the rig from where it is now"
-    )
+    format!("{rig} is missing; connect its disk and restart, or open the rig from its new folder")
 }
 
 /// Where everything lies.

@@ -1,32 +1,23 @@
 //! The Scan room.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 use weavelight::device::scan::{Channel, Summary};
 use weavelight::solution::Report;
 
 /// Of the first swatch.
 pub const FIRST_NAME: &str = "linen 1";
-/// The fields.
 pub const NAME: &str = "Name";
-/// The swatch's.
 pub const THICKNESS: &str = "Thickness";
-/// Time.
 pub const EXPOSURE: &str = "Exposure";
-/// By test shots.
-pub const FIND_EXPOSURE: &str = "find it";
-/// Sensitivity.
+pub const FIND_EXPOSURE: &str = "automatic";
 pub const ISO: &str = "ISO";
-/// Simulated rigs only.
 pub const ON_THE_TABLE: &str = "On the table";
-/// The button.
 pub const TEST_SHOT: &str = "Test shot";
-/// What it does.
 pub const TEST_SHOT_HINT: &str =
     "One picture under one light: exposure, focus, framing. Nothing is kept.";
-/// Which.
 pub const LIGHT: &str = "under light";
-/// In the strip.
 pub const LIGHT_NAME: &str = "Light";
-/// In the strip.
 pub const AMBIENT: &str = "Dark";
 /// The group of settings.
 pub const SOLVING: &str = "Solving";
@@ -34,68 +25,51 @@ pub const SOLVING: &str = "Solving";
 pub const METHODS: [(&str, &str); 3] = [
     (
         "Automatic",
-        "Weighted by the noise; shadows and highlights looked for where the residual asks for it",
+        "Weighted by noise; shadows and highlights are searched for where the residual is large",
     ),
-    ("Least squares", "Plain: every unsaturated sample, all of equal weight"),
-    ("Robust everywhere", "Shadows and highlights looked for at every photosite"),
+    ("Least squares", "Every unsaturated sample, with equal weight"),
+    ("Robust everywhere", "Shadows and highlights are searched for at every photosite"),
 ];
 /// What computes, as on the command line.
-pub const DEVICE: &str = "Computed on";
-/// The choices.
-pub const DEVICES: [&str; 3] = ["whichever is faster", "the processor", "the graphics card"];
+pub const DEVICE: &str = "Compute on";
+pub const DEVICES: [&str; 3] = ["the faster one", "the processor", "the graphics card"];
 /// As on the command line.
-pub const UNDISTORT: &str = "Take out the lens's distortion";
+pub const UNDISTORT: &str = "Remove lens distortion";
 /// As on the command line.
 pub const NORMAL_Y_DOWN: &str = "Green points down (DirectX)";
-/// The big button.
 pub const SCAN: &str = "Scan the swatch";
-/// Its key.
 pub const SPACE: &str = "or press Space";
 /// Why it is grey.
-pub const BUSY: &str = "Something else is going on; see below";
+pub const BUSY: &str = "Busy: see the status bar";
 /// Why it is grey.
-pub const TAKEN: &str = "A scan of this name is there already; choose another name";
+pub const TAKEN: &str = "A scan of this name exists; choose another name";
 /// Why it is grey.
 pub const UNREAD: &str = "A number above cannot be read; correct it first";
-/// Of a thickness.
 pub const NOT_MEASURED: &str = "not measured";
-/// While it runs.
 pub const PAUSE: &str = "Pause";
-/// While it rests.
 pub const GO_ON: &str = "Continue";
-/// Ends it.
 pub const STOP: &str = "Stop";
-/// What that means.
-pub const STOP_HINT: &str = "Frames that are there stay; the scan can be continued later.";
+pub const STOP_HINT: &str = "Frames taken so far are kept; the scan can be continued later.";
 /// Goes on with an unfinished scan.
-pub const RESUME: &str = "Continue it";
-/// Does not.
+pub const RESUME: &str = "Continue scan";
 pub const LEAVE: &str = "Not now";
 /// Opens the Look room.
 pub const LOOK_CLOSER: &str = "Look closer";
-/// Its key.
 pub const ENTER: &str = "Enter";
 /// Scans the same again.
 pub const REPEAT: &str = "Scan again";
 /// What becomes of the old one.
 pub const REPEAT_HINT: &str =
     "The scan shown here and its maps go to the bin; Undo brings them back";
-/// Brings it back.
 pub const UNDO: &str = "Undo";
 /// Makes the maps of a scan that has none.
 pub const SOLVE: &str = "Solve it";
-/// Clears the table.
 pub const NEXT: &str = "Next swatch";
-/// Work.
 pub const TAKING_TEST_SHOT: &str = "Test shot";
-/// Work.
 pub const METERING: &str = "finding the exposure";
-/// Work.
 pub const BOARD_LOST: &str = "the light board is gone; plug it in again";
-/// Work.
-pub const LAYING_OUT: &str = "Laying out the fabric";
-/// Work.
-pub const BRINGING_BACK: &str = "Bringing the earlier scan back";
+pub const LAYING_OUT: &str = "Changing the fabric";
+pub const BRINGING_BACK: &str = "Restoring the earlier scan";
 /// Layers of the maps.
 pub const LAYERS: [&str; 3] = ["Relit", "Normals", "Albedo"];
 /// The maps, for those who do not see them.
@@ -105,14 +79,12 @@ pub const DRAG_LIGHT: &str = "Drag: move the light. Wheel: zoom. Right button: m
 /// How to move the maps.
 pub const DRAG_MAPS: &str = "Drag: move the picture. Wheel: zoom.";
 /// Of the test shot.
-pub const MARK_CLIPPED: &str = "Mark what clips";
+pub const MARK_CLIPPED: &str = "Mark clipped pixels";
 /// Of the test shot.
 pub const HISTOGRAM: &str = "Histogram";
 /// Of the test shot.
 pub const FOCUS_HINT: &str = "Larger is sharper: turn the focus ring and take another test shot";
-/// The empty room.
 pub const NOTHING_YET: &str = "Lay the swatch on the table and press Space";
-/// The empty room.
 pub const HOW_TO: &str =
     "A test shot shows exposure and focus first. Maps appear here while the lights fire.";
 /// While the first lights fire.
@@ -123,9 +95,8 @@ pub const NO_MAPS: &str = "Frames are taken; maps need a calibration first";
 pub const NOT_CALIBRATED: &str =
     "This rig is not calibrated yet: scans can be taken, but maps need a calibration";
 /// Where the calibration is old.
-pub const TO_CALIBRATE: &str = "Go and check it";
-/// The way out.
-pub const CALIBRATE: &str = "Calibrate it";
+pub const TO_CALIBRATE: &str = "Check calibration";
+pub const CALIBRATE: &str = "Calibrate the rig";
 
 /// Work.
 pub fn scanning(name: &str) -> String {
@@ -139,7 +110,7 @@ pub fn solving(name: &str) -> String {
 
 /// A frame taken again.
 pub fn again(why: &str) -> String {
-    format!("{why}; it is taken again")
+    format!("{why}; the frame is taken again")
 }
 
 /// A scan that was stopped.
@@ -148,17 +119,17 @@ pub fn unfinished(name: &str, frames: usize) -> String {
         1 => "one frame".to_owned(),
         frames => format!("{frames} frames"),
     };
-    format!("“{name}” was stopped after {after}. Continue where it stood?")
+    format!("“{name}” was stopped after {after}. Continue it?")
 }
 
 /// A scan that was taken again.
 pub fn replaced(name: &str) -> String {
-    format!("The other scan of “{name}” is in the bin.")
+    format!("The previous scan of “{name}” is in the bin.")
 }
 
 /// A scan that was here before.
 pub fn brought_back(name: &str) -> String {
-    format!("“{name}” is back")
+    format!("“{name}” is restored")
 }
 
 /// A frame's place in the strip, in words.
@@ -205,4 +176,9 @@ pub fn channel(channel: &Channel) -> String {
 /// The focus measure.
 pub fn focus(sharpness: f64) -> String {
     format!("Focus {sharpness:.4}")
+}
+
+/// How many warnings a scan and its solution have.
+pub fn warnings(count: usize) -> String {
+    if count == 1 { "1 warning".to_owned() } else { format!("{count} warnings") }
 }

@@ -1,15 +1,14 @@
 //! The Scans room.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 use crate::model::scan_entry::ScanEntry;
 use std::path::Path;
 
-/// The field.
 pub const SEARCH: &str = "Search by name";
 /// Until they are there.
-pub const LISTING: &str = "Looking what there is…";
-/// The empty room.
+pub const LISTING: &str = "Loading scans…";
 pub const NONE: &str = "No scans yet";
-/// The empty room.
 pub const GO_SCAN: &str = "Scan the first swatch";
 /// Into the Look room.
 pub const OPEN: &str = "Open";
@@ -17,25 +16,17 @@ pub const OPEN: &str = "Open";
 pub const SOLVE: &str = "Solve";
 /// Where there is one.
 pub const SOLVE_AGAIN: &str = "Solve again";
-/// Nothing to solve.
 pub const UP_TO_DATE: &str =
     "Up to date: it was solved from the same frames and calibration with the same settings.";
-/// Solve it nevertheless.
-pub const SOLVE_ALL_THE_SAME: &str = "Solve it all the same";
-/// What that means.
+pub const SOLVE_ALL_THE_SAME: &str = "Solve anyway";
 pub const DELETE_HINT: &str =
     "Frames and maps go to the system's bin, from where they can be restored";
 /// Brings back what was deleted.
 pub const UNDO: &str = "Undo";
-/// Work.
-pub const BRINGING_BACK: &str = "Bringing the scan back";
-/// The field.
+pub const BRINGING_BACK: &str = "Restoring the scan";
 pub const EXPORT_TO: &str = "Export the maps to";
-/// The button.
 pub const EXPORT: &str = "Export";
-/// Work.
 pub const EXPORTING: &str = "Exporting";
-/// Work.
 pub const DELETING: &str = "Deleting the scan";
 
 /// Into the bin.

@@ -1,18 +1,18 @@
 //! Words of what all rooms share: questions, fields, dialogues, problems.
 
+#![allow(missing_docs, reason = "a text says what it is")]
+
 use crate::model::number::{Unit, Unreadable};
 use std::ops::RangeInclusive;
 
 /// What is asked before something ends: heading, text, the button that goes on as before, the one that does not.
 pub mod questions {
-    /// Escape.
     pub const STOP_SCAN: [&str; 4] = [
         "Stop the scan?",
         "The frames taken so far are kept, and the scan can be continued later.",
         "Keep scanning",
         "Stop the scan",
     ];
-    /// Closing the window.
     pub const QUIT_WHILE_SCANNING: [&str; 4] = [
         "A scan is under way",
         "Stop it and quit? The frames taken so far are kept, and the scan can be continued at the next start.",
@@ -58,7 +58,6 @@ fn wanted(unit: Unit) -> &'static str {
 
 /// Where the desktop has no dialogue for folders and files.
 pub const NO_DIALOGUE: &str = "This desktop offers no dialogue for files: neither a desktop portal (xdg-desktop-portal) nor zenity was found. Install one of them, or type or paste the path into the field.";
-/// Copies a text.
 pub const COPY: &str = "Copy";
 /// Puts the problems out of the way.
 pub const HIDE: &str = "Hide";
@@ -77,13 +76,9 @@ pub fn no_thread(what: &str, error: &std::io::Error) -> String {
 
 /// What threads are for.
 pub mod threads {
-    /// The worker.
     pub const WINDOW: &str = "for the window";
-    /// Keeping settings.
     pub const SETTINGS: &str = "to keep the settings";
-    /// Keeping strokes.
     pub const STROKES: &str = "to keep the strokes";
-    /// A dialogue.
     pub const DIALOGUE: &str = "for the dialogue";
     /// What is seen of a scan while it goes on.
     pub const PREVIEWS: &str = "to show the scan while it goes on";

@@ -193,7 +193,7 @@ fn solving_what_is_up_to_date_says_so() {
     let made = || std::fs::metadata(&report).unwrap().modified().unwrap();
     let first = made();
     window.click("Solve again");
-    window.click("Solve it all the same");
+    window.click("Solve anyway");
     window.idle();
     assert!(made() > first, "it was solved again");
     assert!(window.harness.query_by_label_contains("Up to date").is_none());
@@ -209,7 +209,7 @@ fn frames_that_were_there_show_when_a_scan_goes_on() {
     window.open_small_rig();
     window.enter(Room::Scan);
     let there: Vec<String> = (0..10).map(|light| format!("Light {light}, taken")).collect();
-    window.click("Continue it");
+    window.click("Continue scan");
     window.until_label("Stop");
     window.until_label(&there[2]);
     window.until_label("Look closer");
@@ -230,7 +230,7 @@ fn frames_that_are_gone_are_not_counted() {
     }
     window.open_small_rig();
     window.enter(Room::Scan);
-    window.until_label("“linen 1” was stopped after 2 frames. Continue where it stood?");
+    window.until_label("“linen 1” was stopped after 2 frames. Continue it?");
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn look_shows_the_last_scan_unless_another_is_to_stay() {
     window.idle();
     assert!(shown(&window, "linen 1"), "the last one");
     window.click("Open…");
-    window.click("Stay with this one");
+    window.click("Keep this one open");
     window.harness.key_press(Key::Escape);
     window.enter(Room::Scan);
     window.click("Next swatch");
@@ -298,7 +298,7 @@ fn whatever_is_dropped_is_used_for_what_it_is() {
     drop_on(&mut window, &rig.join("solutions/silk 12/normal.exr"), Ok(Room::Look));
     let pictures = window.home().join("pictures");
     std::fs::create_dir(&pictures).unwrap();
-    drop_on(&mut window, &pictures, Err("pictures is no rig (rig.toml), scan"));
+    drop_on(&mut window, &pictures, Err("pictures is not a rig (rig.toml), scan"));
     // A scan of the same name from elsewhere gets a solution of its own.
     let before = identity(&rig, "silk 12");
     let elsewhere = window.home().join("usb/silk 12");

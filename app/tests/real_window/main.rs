@@ -86,7 +86,7 @@ fn a_killed_window_reopens_the_scan_where_it_stood() {
 
     desktop.open();
     desktop.picture("app-reopened");
-    // "Continue it" has the keyboard from the start: one key goes on.
+    // "Continue scan" has the keyboard from the start: one key goes on.
     desktop.key("Return");
     exists(&rig.join("solutions/linen 1/report.json"));
     assert!(frame(9).is_ok());

@@ -180,7 +180,7 @@ fn a_test_shot_waits_for_numbers_that_are_read() {
 fn exposures_are_fractions_too() {
     let mut window = window();
     window.enter(Room::Scan);
-    window.click("find it");
+    window.click("automatic");
     window.harness.run();
     write(&mut window.harness, "Exposure", "1/8 s");
     enter(&mut window);
@@ -197,7 +197,7 @@ fn exposures_are_fractions_too() {
     write(&mut window.harness, "Exposure", "long");
     enter(&mut window);
     assert!(!can_scan(&window));
-    window.click("find it");
+    window.click("automatic");
     window.harness.run();
     assert!(can_scan(&window));
 }

@@ -62,7 +62,7 @@ fn escape_leaves_a_field_before_it_asks_about_the_scan() {
     window.until("it is stopped", |app| app.is_idle());
     assert_eq!(question(&window), None);
     window.enter(Room::Scan);
-    window.until_label("Continue it");
+    window.until_label("Continue scan");
 }
 
 #[test]

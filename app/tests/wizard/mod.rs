@@ -106,7 +106,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     desk::check_names(&window.harness);
 
     // The rest by itself, stopped on the way: what is finished stays.
-    window.click("Do the rest by itself");
+    window.click("Finish automatically");
     window.until_label("Raise the white sheet");
     window.click("Stop");
     window.idle();
@@ -119,7 +119,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     looks(&mut window, "calibrate-sheet", &mut results);
     let table = std::fs::read_to_string(window.rig().join("scene.toml")).unwrap();
     assert!(!table.contains("[table]"), "the swatch lies there again: {table}");
-    window.click("Do the rest by itself");
+    window.click("Finish automatically");
     window.until_label("Tilt the white sheet, 2 of 4");
     window.until_label("Tilt the white sheet once more, to check");
     window.until_label("The rig is calibrated");
@@ -149,7 +149,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     window.idle();
 
     // Anew: the old one stays in use, and lies in the history.
-    window.click("Calibrate anew");
+    window.click("Recalibrate");
     window.until_label("Lay the chessboard flat in the middle");
     window.idle();
     assert!(window.rig().join("calibration/lights.toml").exists());
@@ -171,7 +171,7 @@ fn the_first_calibration_takes_two_minutes() {
     window.enter(Room::Calibrate);
     window.idle();
     let begun = std::time::Instant::now();
-    window.click("Do the rest by itself");
+    window.click("Finish automatically");
     for task in [
         "Lay the colour chart on the table",
         "Raise the white sheet",

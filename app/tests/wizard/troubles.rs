@@ -177,13 +177,13 @@ fn a_calibration_from_elsewhere_is_checked() {
     window.until_label("The rig is calibrated");
     window.idle();
     // Its truth knows nothing of this rig's lens: what counts is that there is a verdict.
-    assert_eq!(window.says("A sheet that the calibration has not seen is solved"), 1);
+    assert_eq!(window.says("A sheet that was not used for the calibration is solved"), 1);
     assert!(window.rig().join("targets/check-tilt/session.toml").exists());
     // The next day.
     window.open_small_rig();
-    window.until_label("Go and scan");
+    window.until_label("Start scanning");
     window.idle();
-    assert_eq!(window.says("A sheet that the calibration has not seen is solved"), 1);
+    assert_eq!(window.says("A sheet that was not used for the calibration is solved"), 1);
 }
 
 #[test]

@@ -35,7 +35,7 @@ pub enum Command {
     Draft(PathBuf),
     /// Solve the capture session in this folder, which has no solution yet, and look at that.
     SolveScan(PathBuf, SolveSettings),
-    /// Solve again, into the solution's folder, and look at it.
+    /// Solve again, into the solution's folder, and open it.
     Solve(Sources, PathBuf, SolveSettings),
 }
 

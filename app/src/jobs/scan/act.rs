@@ -88,7 +88,6 @@ fn scan_and_solve(order: &Order, tools: &mut Tools, out: &Outbox) {
     });
     match (outcome, into) {
         (Ok(Outcome::Complete(summary)), Some(folder)) => {
-            out.warn(&order.name, &summary.warnings);
             send_names(&project, out);
             out.send(Update::Scan(Event::Complete(summary)));
             if project.is_calibrated() {

@@ -22,7 +22,8 @@ pub struct SolvedScan {
     pub up_to_date: bool,
 }
 
-/// The same call with the same settings as the command line's. `None` where it failed: then the user knows.
+/// Solves a scan with the same call and settings as the command line. `None` where that failed; the error is reported.
+/// Warnings are in the report, which the room shows.
 pub fn solve(
     scan: &Path,
     (settings, reuse): (SolveSettings, Reuse),
@@ -50,7 +51,6 @@ pub fn solve(
         Ok(run_with_page(&options, &send, Some(&page))?)
     });
     let Solved { report, up_to_date } = solved.ok()?;
-    out.warn(&name, &report.warnings);
     let (report, expected_deg) = (Box::new(report), expected.into_inner().flatten());
     Some(SolvedScan { solution, report, expected_deg, up_to_date })
 }

@@ -28,6 +28,9 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
         }
         Command::Solve { scan, settings, reuse } => {
             if let Some(outcome) = scan::solve::solve(&scan, (settings, reuse), tools, out) {
+                // This room has no place for a report.
+                let name = scan.file_name().unwrap_or_default().to_string_lossy();
+                out.warn(&name, &outcome.report.warnings);
                 out.send(Update::Scans(Event::Solved(scan, outcome.up_to_date)));
             }
         }

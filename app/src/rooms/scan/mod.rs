@@ -57,6 +57,8 @@ pub struct Scan {
     unfinished: Option<UnfinishedScan>,
     /// Whether that was not drawn yet.
     offer_is_new: bool,
+    /// Warnings of the scan that is shown, from taking its frames.
+    scan_warnings: Vec<String>,
     /// What was scanned again, as it was before.
     replaced: Option<Deleted>,
     /// The name is to be counted on, once it is known which are taken.
@@ -183,6 +185,7 @@ impl Scan {
     /// Nothing of the last scan is to be seen.
     fn clear(&mut self) {
         self.strip = Strip::default();
+        self.scan_warnings.clear();
         self.view.begin();
     }
 
@@ -289,6 +292,7 @@ impl Scan {
                     app.settings.scan.exposure_s = used.exposure_s;
                 }
                 self.strip.done();
+                self.scan_warnings.clone_from(&summary.warnings);
                 self.stage = Stage::Scanned(Some(summary));
             }
             Event::Solved { scan, solution, report, expected_deg } => {

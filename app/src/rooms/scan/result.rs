@@ -18,19 +18,31 @@ impl Scan {
     pub(super) fn result(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
         let name = self.about.as_ref().map_or("", |about| about.name.as_str());
         let (good, text) = match &self.stage {
-            Stage::Scanned(Some(summary)) => (summary.warnings.is_empty(), texts::scanned(summary)),
+            Stage::Scanned(Some(summary)) => (true, texts::scanned(summary)),
             Stage::Scanned(None) => (true, texts::brought_back(name)),
             Stage::Solved { report, expected_deg, .. } => {
                 (is_good(report), texts::solved(report, *expected_deg))
             }
             _ => return,
         };
-        let sign = if good { widgets::Sign::Good } else { widgets::Sign::Warning };
+        let warnings = self.warnings();
+        let sign =
+            if good && warnings.is_empty() { widgets::Sign::Good } else { widgets::Sign::Warning };
         ui.horizontal_wrapped(|ui| {
             sign.ui(ui);
             ui.label(RichText::new(text).strong());
             self.next_steps(ui, app);
         });
+        show_warnings(ui, &warnings);
+    }
+
+    /// Warnings of the scan that is shown: from taking its frames, and from its solution.
+    fn warnings(&self) -> Vec<String> {
+        let of_solution = match &self.stage {
+            Stage::Solved { report, .. } => &report.warnings[..],
+            _ => &[],
+        };
+        [&self.scan_warnings[..], of_solution].concat()
     }
 
     fn next_steps(&mut self, ui: &mut egui::Ui, app: &mut AppState) {
@@ -100,6 +112,19 @@ impl Scan {
         };
         self.replaced = replaced;
     }
+}
+
+/// They belong to the result, and stay with it as long as it is shown.
+fn show_warnings(ui: &mut egui::Ui, warnings: &[String]) {
+    if warnings.is_empty() {
+        return;
+    }
+    let title = texts::warnings(warnings.len());
+    egui::CollapsingHeader::new(title).id_salt("scan warnings").show(ui, |ui| {
+        for warning in warnings {
+            ui.add(egui::Label::new(warning).wrap().selectable(true));
+        }
+    });
 }
 
 /// Whether a solution can be kept without looking twice: nothing was warned of, and hardly anything clips.
