@@ -1,5 +1,6 @@
 //! `weavelight calibrate`
 
+use super::calibrate_status;
 use super::output::{Failure, Output, WORK_FAILED};
 use super::progress::Progress;
 use crate::calibrate::{self, CameraOptions, CheckOptions, ColorOptions, LightsOptions, StepState};
@@ -76,9 +77,13 @@ enum What {
         out: PathBuf,
     },
     /// What there is, how good it is, and what to photograph next
-    #[command(after_help = "Example:\n  weavelight calibrate status calibration")]
+    ///
+    /// Of a rig's folder it also says which pictures the window's wizard has taken, and the command that continues there.
+    #[command(
+        after_help = "Examples:\n  weavelight calibrate status calibration\n  weavelight calibrate status rig"
+    )]
     Status {
-        /// Calibration folder
+        /// Calibration folder, or the folder of a rig
         #[arg(value_name = "CALIB")]
         calibration: PathBuf,
     },
@@ -127,6 +132,9 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
             Ok(output(lights_text(&report), &report, &report.warnings))
         }
         What::Status { calibration } => {
+            if calibrate_status::is_rig(calibration) {
+                return calibrate_status::run(calibration, status_text);
+            }
             let status = calibrate::status(calibration).map_err(Failure::work)?;
             Ok(output(status_text(&status), &status, &[]))
         }

@@ -4,6 +4,7 @@
 
 mod bench;
 mod calibrate;
+mod calibrate_status;
 mod compare;
 mod demo;
 mod doctor;

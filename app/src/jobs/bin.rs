@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Folders that are in the bin, and how to find them there again.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Binned {
+pub struct BinnedFolders {
     /// Where they lay.
     pub folders: Vec<PathBuf>,
     items: Vec<trash::TrashItem>,
@@ -52,7 +52,7 @@ pub enum BinError {
     },
 }
 
-impl Binned {
+impl BinnedFolders {
     /// Moves folders to the bin: all that are there, or none.
     ///
     /// # Errors
@@ -157,7 +157,8 @@ mod tests {
         let put = |text: &str| {
             write(&scan, text);
             write(&solution, text);
-            Binned::put([scan.clone(), solution.clone(), home.path().join("not there")]).unwrap()
+            BinnedFolders::put([scan.clone(), solution.clone(), home.path().join("not there")])
+                .unwrap()
         };
         let (first, second) = (put("first"), put("second"));
         assert_eq!((first.folders.len(), read(&scan)), (2, None));

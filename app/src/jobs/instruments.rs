@@ -5,7 +5,7 @@ use crate::model::project::Project;
 use crate::texts::rig as texts;
 use weavelight::device::scan::{Instruments, open};
 
-/// Runs `work` with the rig's board and camera. Where it fails they are let go, so that the next try finds them anew: unplugged
+/// Runs `work` with the rig's board and camera. Where it fails they are closed, so that the next try opens them again: unplugged
 /// and plugged in again, or switched on by then.
 ///
 /// # Errors

@@ -49,7 +49,7 @@ impl Request {
         }
     }
 
-    /// Of which area it is a new try; `None` for what the program asks by itself.
+    /// The area of which it is a new try; `None` for requests that the user did not make.
     pub fn tries(&self) -> Option<Area> {
         let by_the_user = match self {
             Request::Close => false,

@@ -1,4 +1,4 @@
-//! One piece of work: told about, and ended when nobody wants it any more.
+//! Runs a job: reports its progress and its error, and ends it when it is cancelled.
 
 use crate::jobs::control::JobControl;
 use crate::jobs::messages::Update;
@@ -13,7 +13,7 @@ use weavelight::device::scan::Control;
 /// Unwinds from a progress callback.
 struct Cancelled;
 
-/// Where the worker tells what happens.
+/// Where jobs report to the window.
 #[derive(Clone, Debug)]
 pub struct Outbox {
     updates: Sender<Update>,
@@ -38,13 +38,13 @@ impl Outbox {
         self.control.begin();
     }
 
-    /// Tells the window.
+    /// Sends an update to the window.
     pub fn send(&self, update: Update) {
         let _ = self.updates.send(update);
         self.ctx.request_repaint();
     }
 
-    /// Tells how far work is; unwinds where it is no longer wanted. To be called within [`Outbox::job`] only.
+    /// Reports progress; unwinds if the job was cancelled. Call it within [`Outbox::job`] only.
     pub fn tick(&self, share: f64, step: &str) {
         if self.control.is_cancelled() {
             resume_unwind(Box::new(Cancelled));
@@ -62,7 +62,7 @@ impl Outbox {
         self.control.is_cancelled()
     }
 
-    /// Tells how far work is.
+    /// Reports progress.
     pub fn progress(&self, share: f64, step: &str, left: Option<Duration>) {
         self.send(Update::Progress { share, step: step.to_owned(), left });
     }
@@ -83,11 +83,10 @@ impl Outbox {
         self.send(Update::Problem(Problem { area: self.area, ..problem }));
     }
 
-    /// Work that takes its time: told when it begins and ends, with its error put up, and ended where [`Outbox::tick`] finds
-    /// that nobody wants it.
+    /// Runs a job: reports its beginning, its end and its error. [`Outbox::tick`] ends it if it was cancelled.
     ///
     /// # Errors
-    /// Why there is no result; the user knows by then.
+    /// Why there is no result; an error is reported already.
     pub fn job<T, E: std::fmt::Display>(
         &self,
         title: &str,

@@ -1,5 +1,5 @@
-//! Keeps the settings when they change, not only when the window closes: one that is killed forgets nothing. A thread of its
-//! own, so that no frame waits for the disk.
+//! Saves the settings whenever they change, so that a window that is killed loses nothing. Runs in its own thread, so that no
+//! frame waits for the disk.
 
 use crate::model::settings::Settings;
 use crate::texts::shell::{no_thread, threads};
@@ -12,7 +12,7 @@ use weavelight::machine::spawn;
 /// So long nothing must have changed: a slider that is dragged changes them with every frame.
 const QUIET: Duration = Duration::from_millis(300);
 
-/// Keeps settings.
+/// Saves settings.
 #[derive(Debug)]
 pub struct SettingsSaver {
     /// As they are kept, or will soon be.
@@ -27,10 +27,10 @@ impl SettingsSaver {
     pub fn start(known: Settings) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, outcome) = mpsc::channel();
-        let told = outbox.clone();
+        let failure = outbox.clone();
         let thread = spawn("settings", move || keep(&inbox, &outbox));
         let thread = thread.inspect_err(|error| {
-            let _ = told.send(Err(no_thread(threads::SETTINGS, error)));
+            let _ = failure.send(Err(no_thread(threads::SETTINGS, error)));
         });
         let thread = thread.ok();
         Self { known, changes: Some(changes), outcome, thread }
@@ -109,7 +109,7 @@ mod tests {
         saver.update(&settings);
         let begun = Instant::now();
         let trouble = loop {
-            assert!(begun.elapsed() < PATIENCE, "not told");
+            assert!(begun.elapsed() < PATIENCE, "not reported");
             if let Some(Err(trouble)) = saver.outcome() {
                 break trouble;
             }

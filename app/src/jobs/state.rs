@@ -1,10 +1,10 @@
-//! What all rooms share: the rig that is open, what is going on, what went wrong, and what the rooms want done.
+//! What all rooms share: the open rig, the work under way, problems, and the queue of requests to the worker.
 
 use crate::jobs::control::JobAction;
 use crate::jobs::look;
 use crate::jobs::messages::Request;
 use crate::model::activity::Activity;
-use crate::model::names::Taken;
+use crate::model::names::ScanNames;
 use crate::model::problem::{Area, Problem, Severity};
 use crate::model::project::Project;
 use crate::model::room::Room;
@@ -26,10 +26,10 @@ pub struct AppState {
     pub calibration_age_days: Option<i64>,
     /// What the worker is doing.
     pub activity: Option<Activity>,
-    /// What went wrong and nobody has put away yet; the newest last.
+    /// Problems that are not dismissed yet; the newest last.
     pub problems: Vec<Problem>,
     /// The names that scans of the rig have.
-    pub taken: Taken,
+    pub names: ScanNames,
     /// A solution is on its way to the Look room.
     is_opening: bool,
     requests: Vec<Request>,
@@ -37,7 +37,7 @@ pub struct AppState {
 }
 
 impl AppState {
-    /// An empty desk.
+    /// The state before a rig is open.
     pub fn new(settings: Settings) -> Self {
         Self {
             settings,
@@ -47,7 +47,7 @@ impl AppState {
             calibration_age_days: None,
             activity: None,
             problems: Vec::new(),
-            taken: Taken::default(),
+            names: ScanNames::default(),
             is_opening: false,
             requests: Vec::new(),
             actions: Vec::new(),

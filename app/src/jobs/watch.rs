@@ -10,7 +10,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use weavelight::machine::spawn;
 
-/// Between two looks.
 const INTERVAL: Duration = Duration::from_millis(500);
 
 /// Looks until it is dropped.
@@ -20,7 +19,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Looks at the lock of a rig, and tells when its holder changes; and at the calibration.
+    /// Watches the lock and the calibration of a rig, and reports when either changes.
     pub(crate) fn start(project: &Project, out: Outbox) -> Self {
         let (project, rig_file, folder) =
             (project.clone(), project.rig_file(), project.folder.clone());

@@ -38,8 +38,8 @@ impl Activity {
 /// Why work has no result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// Nobody wanted it any more.
+    /// It was cancelled.
     Cancelled,
-    /// It failed, and the user has been told.
+    /// It failed; the error is reported.
     Failed,
 }

@@ -1,7 +1,7 @@
 //! A swatch's name as the name of a folder. Any text may be a name; every file system has to take the folder.
 //!
 //! Different names have different folders, and a folder's name differs from every other in more than upper and lower case, so
-//! that a rig can be copied to a disk that does not tell them apart. The name itself is kept in `session.toml`.
+//! that a rig can be copied to a disk that does not distinguish them. The name itself is kept in `session.toml`.
 
 use std::path::{Path, PathBuf};
 use weavelight::files::sha256_hex;
@@ -80,9 +80,9 @@ fn folded(folder: &str) -> String {
 
 /// The folders that are there, by name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Taken(Vec<String>);
+pub struct ScanNames(Vec<String>);
 
-impl Taken {
+impl ScanNames {
     /// The names of whatever lies in these folders.
     pub fn read(folders: &[PathBuf]) -> Self {
         let entries = folders.iter().flat_map(std::fs::read_dir).flatten().flatten();
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn names_that_differ_in_case_only_are_two_scans() {
         let folder = tempfile::tempdir().unwrap();
-        let read = || Taken::read(&[folder.path().to_owned()]);
+        let read = || ScanNames::read(&[folder.path().to_owned()]);
         for name in ["Linen 1", "linen 1", "LINEN 1"] {
             assert!(!read().has(name), "{name}");
             std::fs::create_dir(folder.path().join(read().free(name))).unwrap();

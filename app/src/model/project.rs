@@ -1,6 +1,6 @@
 //! The folders of one rig: everything that belongs to it lies beside its `rig.toml`.
 
-use crate::model::names::Taken;
+use crate::model::names::ScanNames;
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use weavelight::calibrate::wizard::RigFolder;
@@ -45,8 +45,8 @@ impl Project {
     }
 
     /// The names that scans have; and solutions, since a new scan must not take the place of one whose scan is gone.
-    pub fn taken(&self) -> Taken {
-        Taken::read(&[self.scans(), self.solutions()])
+    pub fn names(&self) -> ScanNames {
+        ScanNames::read(&[self.scans(), self.solutions()])
     }
 
     /// The solution of a capture session. That of a capture session from elsewhere never takes the place of another's: it is

@@ -1,6 +1,6 @@
 //! What the technician enters for a scan.
 
-use crate::model::names::Taken;
+use crate::model::names::ScanNames;
 use serde::{Deserialize, Serialize};
 
 /// Name of the first swatch.
@@ -36,7 +36,7 @@ impl Default for ScanForm {
 
 impl ScanForm {
     /// Counts the name on until no scan has it.
-    pub(crate) fn next_free_name(&mut self, taken: &Taken) {
+    pub(crate) fn next_free_name(&mut self, taken: &ScanNames) {
         while taken.has(self.name.trim()) {
             self.name = next_name(&self.name);
         }

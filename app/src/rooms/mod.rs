@@ -17,7 +17,7 @@ pub trait RoomPanel: Debug {
     /// Its name, as the list of rooms shows it.
     fn title(&self) -> &'static str;
 
-    /// Draws it.
+    /// Draws the room.
     fn ui(&mut self, ui: &mut egui::Ui, app: &mut AppState);
 
     /// An update for this room has come.

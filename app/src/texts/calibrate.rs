@@ -7,7 +7,7 @@ use weavelight::calibrate::{Action, SeenSheet};
 
 /// The button that takes the pictures of a task.
 pub const TAKE: &str = "Take the picture (Space)";
-/// The button that fits where that did not happen by itself.
+/// The button that starts a fit which was stopped or failed.
 pub const FIT: &str = "Calculate (Space)";
 /// The button that takes a test shot.
 pub const LOOK: &str = "Live";
@@ -15,14 +15,14 @@ pub const LOOK_HINT: &str = "Takes test shots continuously and marks what is fou
 /// Where that was ended.
 pub const NOT_LOOKED: &str = "The pictures of this rig's calibration have not been checked yet";
 pub const LOOK_NOW: &str = "Check them";
-/// The button that goes on by itself.
+/// The button that takes all remaining pictures.
 pub const AUTO: &str = "Finish automatically";
 pub const AUTO_HINT: &str = "The simulated rig places and photographs all remaining targets";
 /// The button that ends that.
 pub const STOP: &str = "Stop";
-/// The button that begins everything anew.
-pub const ANEW: &str = "Recalibrate";
-pub const ANEW_HINT: &str =
+/// The button that starts from the beginning.
+pub const START_OVER: &str = "Recalibrate";
+pub const START_OVER_HINT: &str =
     "The calibration stays in use until each part is replaced; the old one goes into the history";
 /// The button that takes a step's pictures again.
 pub const AGAIN: &str = "Again";
@@ -325,7 +325,7 @@ pub fn sigma(now_mm: f64, then_mm: Option<f64>) -> String {
 pub fn better(action: &Action, begun: bool, checked: bool) -> String {
     let again = |of: Step| match begun {
         true => format!("Press “{AGAIN}” beside {}", step(of)),
-        false => format!("Press “{ANEW}”"),
+        false => format!("Press “{START_OVER}”"),
     };
     match action {
         Action::Boards | Action::BetterBoards => format!(

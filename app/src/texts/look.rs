@@ -82,7 +82,7 @@ pub const NO_FRAME: &str = "This light has no frame.";
 
 pub const PHOTOSITE: &str = "Photosite";
 pub const POINT_AT: &str = "Point at the cloth.";
-pub const CLICK_FOR_LIGHTS: &str = "Click it to see which lights were used.";
+pub const CLICK_FOR_LIGHTS: &str = "Click it to see its lights.";
 pub const LOUPE: &str = "Loupe";
 pub const PIXEL: &str = "Pixel";
 pub const PLACE: &str = "Place";

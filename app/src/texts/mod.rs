@@ -1,4 +1,4 @@
-//! Every word that the window says, by room; what goes wrong is told in the library's own words.
+//! Every text of the window, by room. Errors are in the library's own words.
 
 #![allow(missing_docs, reason = "a text says what it is")]
 

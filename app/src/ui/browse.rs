@@ -81,7 +81,7 @@ impl Browse {
     ) {
         let (sender, answer) = mpsc::channel();
         let ctx = ctx.clone();
-        let told = sender.clone();
+        let failure = sender.clone();
         let waits = weavelight::machine::spawn("dialogue", move || {
             let answer = match available() {
                 true => pollster::block_on(dialogue).map_or(Answer::Closed, Answer::Chosen),
@@ -93,7 +93,7 @@ impl Browse {
         });
         if let Err(error) = waits {
             let why = shell::no_thread(shell::threads::DIALOGUE, &error);
-            let _ = told.send(Answer::None(why));
+            let _ = failure.send(Answer::None(why));
         }
         self.answer = Some(answer);
     }

@@ -59,7 +59,7 @@ impl Number {
         self.range.clone()
     }
 
-    /// Draws the field. `name` tells it from others beside it.
+    /// Draws the field. `name` distinguishes it from others beside it.
     pub fn show<N: Numeric>(&self, ui: &mut Ui, name: &str, value: &mut N) -> Field {
         let enabled = ui.is_enabled();
         let mut current = value.to_f64();

@@ -1,4 +1,4 @@
-//! Colours, sizes and the icon. Colours that carry meaning are Okabe and Ito's, told apart with every kind of colour vision,
+//! Colours, sizes and the icon. Colours that carry meaning are Okabe and Ito's, distinguishable with every kind of colour vision,
 //! and never stand without a word or a shape beside them.
 
 use crate::model::settings::{Settings, Theme};
@@ -18,7 +18,7 @@ pub mod meaning {
     pub const BAD: Color32 = Color32::from_rgb(0xD5, 0x5E, 0x00);
     /// A lit LED.
     pub const LIT: Color32 = Color32::from_rgb(0xF0, 0xE4, 0x42);
-    /// Channels of a histogram: red, green and blue as everybody can tell them apart.
+    /// Channels of a histogram: red, green and blue distinguishable with every kind of colour vision.
     pub const CHANNELS: [Color32; 3] = [
         Color32::from_rgb(0xD5, 0x5E, 0x00),
         Color32::from_rgb(0x00, 0x9E, 0x73),

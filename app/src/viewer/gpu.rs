@@ -82,7 +82,6 @@ pub(super) struct Frame {
     pub(super) viewport: Viewport,
     /// Size of the view in points, and pixels per point.
     pub(super) screen: (Vec2, f32),
-    /// At half resolution.
     pub(super) coarse: bool,
     pub(super) uniform: Box<Uniform>,
 }

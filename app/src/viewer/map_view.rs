@@ -24,7 +24,7 @@ pub struct MapView {
 
 /// Where things are on the screen.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct MapArea {
     /// What the mouse does.
     pub response: Response,
     /// Where.
@@ -33,7 +33,7 @@ pub struct Shown {
     pub viewport: Viewport,
 }
 
-impl Shown {
+impl MapArea {
     /// Pixel coordinates under the mouse; centre of the first pixel: 0, 0.
     pub fn pixel_under_mouse(&self) -> Option<[f64; 2]> {
         let at = self.response.hover_pos().or(self.response.interact_pointer_pos())?;
@@ -72,7 +72,7 @@ impl MapView {
     }
 
     /// Draws in all that is left of `ui`; wheel, pinch and drag act.
-    pub fn show(&mut self, ui: &mut egui::Ui, canvas: &Canvas) -> Shown {
+    pub fn show(&mut self, ui: &mut egui::Ui, canvas: &Canvas) -> MapArea {
         let shown = self.begin(ui, canvas.maps, (canvas.name, canvas.drag_pans));
         self.paint(ui, &shown, canvas);
         shown
@@ -85,7 +85,7 @@ impl MapView {
         ui: &mut egui::Ui,
         maps: &Maps,
         (name, drag_pans): (&str, bool),
-    ) -> Shown {
+    ) -> MapArea {
         let (_, rect) = ui.allocate_space(ui.available_size());
         // Its own name: what else the room shows must not make another view of it in the middle of a drag.
         let id = Id::unique(("map view", name));
@@ -103,11 +103,11 @@ impl MapView {
         if moved || self.viewport.is_some() {
             self.viewport = Some(viewport);
         }
-        Shown { response, rect, viewport }
+        MapArea { response, rect, viewport }
     }
 
     /// The second half of [`MapView::show`].
-    pub fn paint(&mut self, ui: &mut egui::Ui, shown: &Shown, canvas: &Canvas) {
+    pub fn paint(&mut self, ui: &mut egui::Ui, shown: &MapArea, canvas: &Canvas) {
         let coarse = self.is_coarse(ui.ctx(), shown.rect);
         paint(ui, shown, coarse, canvas);
     }
@@ -169,7 +169,7 @@ fn say_no_graphics(ui: &mut egui::Ui, rect: Rect) {
     });
 }
 
-fn paint(ui: &mut egui::Ui, shown: &Shown, coarse: bool, canvas: &Canvas) {
+fn paint(ui: &mut egui::Ui, shown: &MapArea, coarse: bool, canvas: &Canvas) {
     let (rect, viewport) = (shown.rect, shown.viewport);
     // Neutral, and not so bright that it blinds the eye to the cloth.
     let ground = Color32::from_gray(if ui.visuals().dark_mode { 20 } else { 200 });

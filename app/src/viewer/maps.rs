@@ -22,7 +22,7 @@ pub struct Maps {
 pub struct Sample {
     /// Unit normal, rig frame.
     pub normal: [f32; 3],
-    /// Expected error of the normal, degrees; 0 where nobody knows.
+    /// Expected error of the normal, degrees; 0 where unknown.
     pub error_deg: f32,
     /// Linear RGB.
     pub albedo: [f32; 3],

@@ -13,7 +13,7 @@ pub struct Painting {
     mask: Image<bool>,
     undone: Vec<Step>,
     done: Vec<Step>,
-    /// Counts changes, for whoever draws it.
+    /// Counts changes, so that a drawing of it knows when to follow.
     pub version: u64,
     /// Whether it differs from what is on the disk.
     pub changed: bool,

@@ -21,7 +21,6 @@ pub(super) struct Pace {
 /// How this frame is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Drawn {
-    /// At half resolution.
     pub(super) coarse: bool,
     /// Another frame is wanted right after it, to measure the time.
     pub(super) again: bool,
@@ -64,7 +63,7 @@ mod tests {
         assert_eq!(coarse(&mut pace, &[((false, false), 0.02)]), [false]);
         // The next drag knows.
         assert_eq!(coarse(&mut pace, &[(DRAG, 0.5)]), [true]);
-        // A smaller view is measured anew.
+        // A smaller view is measured again.
         assert!(!pace.next(DRAG, 0.02, VIEW / 4.0).coarse);
     }
 

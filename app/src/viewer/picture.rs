@@ -68,7 +68,7 @@ fn balance(intensity: [f64; 3]) -> [f32; 3] {
     intensity.map(|channel| if channel > 0.0 { (intensity[1] / channel) as f32 } else { 1.0 })
 }
 
-/// Gains that make the mean grey: for pictures of lights that nobody has measured yet.
+/// Gains that make the mean grey: for pictures of lights that are not calibrated yet.
 fn grey_world(picture: &Image<[f32; 3]>) -> [f32; 3] {
     let mean = |c: usize| picture.data.iter().map(|rgb| f64::from(rgb[c].max(0.0))).sum::<f64>();
     balance([mean(0), mean(1), mean(2)])

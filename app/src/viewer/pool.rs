@@ -7,7 +7,7 @@ use std::sync::{Arc, Weak};
 
 /// Bytes of a tile on the card.
 pub const TILE_BYTES: usize = SLOT * SLOT * size_of::<Texel>();
-/// A pool grows by so many tiles, lest a window that is being enlarged asks for a new one every frame.
+/// A pool grows by so many tiles, so that a window that is being enlarged does not need a new one every frame.
 const STEP: usize = 32;
 /// Most tiles that a pool holds: what every card offers as layers of one texture.
 const MOST: usize = 256;
@@ -34,7 +34,6 @@ struct Slot {
 /// Where a tile's texels are, as the shader wants it: layer (negative: none), left and top, texels per pixel.
 pub(super) type Locator = [f32; 4];
 
-/// No tile.
 pub(super) const NOWHERE: Locator = [-1.0, 0.0, 0.0, 1.0];
 
 impl Pool {

@@ -31,11 +31,8 @@ struct Level {
 /// A tile's place: level 0 is full size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place {
-    /// Halvings.
     pub(super) level: usize,
-    /// From the left.
     pub(super) x: usize,
-    /// From the top.
     pub(super) y: usize,
 }
 

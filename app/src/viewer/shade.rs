@@ -1,4 +1,4 @@
-//! What the shader is told, and its shading once more in plain code: the reference that it is held against.
+//! The shader's inputs, and its shading in plain code: the reference that it is tested against.
 
 use crate::viewer::appearance::{Appearance, Compose};
 use crate::viewer::geometry::{Geometry, NODES};
@@ -11,7 +11,7 @@ use weavelight_calibration::irradiance::light_vector_in_rig;
 /// The shader's `View`: eleven vectors and the grid.
 pub type Uniform = [[f32; 4]; 11 + NODES * NODES];
 
-/// What the shader is told of one frame. `screen`: points.
+/// The shader's inputs of one frame. `screen`: points.
 pub fn uniform(
     appearance: &Appearance,
     viewport: &Viewport,

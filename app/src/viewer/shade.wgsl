@@ -131,7 +131,7 @@ fn scale_at(value: f32, row: f32) -> vec3f {
     return textureSampleLevel(scales, smooth_sampler, vec2f(u, (row + 0.5) / 2.0), 0.0).rgb;
 }
 
-struct Shown {
+struct MapArea {
     // sRGB
     colour: vec3f,
     // linear
@@ -139,16 +139,16 @@ struct Shown {
     covered: f32,
 }
 
-fn linear_side(value: vec3f, covered: f32) -> Shown {
+fn linear_side(value: vec3f, covered: f32) -> MapArea {
     let bright = value * view.modes.z;
-    return Shown(encode(bright), bright, covered);
+    return MapArea(encode(bright), bright, covered);
 }
 
-fn coded_side(colour: vec3f, covered: f32) -> Shown {
-    return Shown(colour, colour, covered);
+fn coded_side(colour: vec3f, covered: f32) -> MapArea {
+    return MapArea(colour, colour, covered);
 }
 
-fn side(mode: f32, surface: vec4f, albedo: vec4f, picture: vec4f, pixel: vec2f) -> Shown {
+fn side(mode: f32, surface: vec4f, albedo: vec4f, picture: vec4f, pixel: vec2f) -> MapArea {
     let normal = normal_of(surface);
     let picture_rgb = picture.rgb / max(picture.w, 1e-4);
     switch i32(mode) {
@@ -172,7 +172,7 @@ fn side(mode: f32, surface: vec4f, albedo: vec4f, picture: vec4f, pixel: vec2f) 
     }
 }
 
-fn over_ground(shown: Shown) -> vec3f {
+fn over_ground(shown: MapArea) -> vec3f {
     return mix(view.ground.rgb, shown.colour, clamp(shown.covered, 0.0, 1.0));
 }
 

@@ -45,7 +45,7 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
         Command::Look(task, targets) => look(task, &targets, tools, out),
         Command::Fit(step) => fit(step, &project, out),
         Command::Again(step) => report_moved(again(step, &project), out),
-        Command::Anew => report_moved(anew(&project), out),
+        Command::StartOver => report_moved(start_over(&project), out),
         Command::Restore(entry) => report_moved(history::restore(&project, &entry), out),
     };
     if let Err(ended) = done {
@@ -422,13 +422,13 @@ fn sheets(project: &Project) -> Vec<PathBuf> {
 fn again(step: Step, project: &Project) -> Result<Option<PathBuf>, AnyError> {
     match step {
         // Everything stands in the camera's frame.
-        Step::Camera => anew(project),
+        Step::Camera => start_over(project),
         step => Ok(history::put_away(project, step)?),
     }
 }
 
 /// That the folder is there says that a calibration is under way.
-fn anew(project: &Project) -> Result<Option<PathBuf>, AnyError> {
+fn start_over(project: &Project) -> Result<Option<PathBuf>, AnyError> {
     let kept = history::keep(project)?;
     std::fs::create_dir_all(project.targets())?;
     Ok(kept)

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use weavelight::calibrate::wizard::{Entry, State, Step, Task};
 use weavelight::calibrate::{CameraReport, CheckReport, ColorReport, LightsReport};
 
-/// What this room asks of the worker.
+/// Requests of the Calibrate room.
 #[derive(Debug)]
 pub enum Command {
     /// What is there.
@@ -23,7 +23,7 @@ pub enum Command {
     /// The pictures of a step into the history, to take them again; the calibration stays until the new one is made.
     Again(Step),
     /// Everything into the history, and from the beginning.
-    Anew,
+    StartOver,
     /// An earlier calibration, or a step's pictures, back.
     Restore(Entry),
 }
@@ -41,7 +41,7 @@ pub enum Report {
     Check(Box<CheckReport>),
 }
 
-/// What the worker tells this room.
+/// Updates for the Calibrate room.
 #[derive(Debug)]
 pub enum Event {
     /// What is there.
@@ -52,6 +52,6 @@ pub enum Event {
     Report(Report),
     /// What was there before is in this folder now.
     Kept(PathBuf),
-    /// Something failed or was stopped: nothing goes on by itself.
+    /// Something failed or was stopped: automatic steps end.
     Halted(Ended),
 }

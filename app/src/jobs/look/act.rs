@@ -4,7 +4,7 @@ use crate::jobs::identify::{What, is_open, newest_solution};
 use crate::jobs::look::capture::Sources;
 use crate::jobs::look::frames::Frames;
 use crate::jobs::look::opened::OpenError;
-use crate::jobs::look::{Command, Event, Stroked, drafts, opened};
+use crate::jobs::look::{Command, EditedMask, Event, drafts, opened};
 use crate::jobs::messages::Update;
 use crate::jobs::outbox::Outbox;
 use crate::jobs::tools::Tools;
@@ -31,7 +31,7 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
         Command::Picture(sources, light) => look_at(&sources, light, Kind::Picture, tools, out),
         Command::Residual(sources, light) => look_at(&sources, light, Kind::Residual, tools, out),
         Command::Photosite(sources, at) => photosite(&sources, at, tools, out),
-        Command::Mask(sources, stroked) => save_mask(&sources.session, stroked, tools, out),
+        Command::Mask(sources, edited) => save_mask(&sources.session, edited, tools, out),
         Command::Draft(file) => {
             let draft = drafts::read(&file).map(Box::new);
             out.send(Update::Look(Event::Draft(file, draft)));
@@ -188,13 +188,13 @@ fn scene<'t>(
 
 /// Writes the mask and notes it in the manifest; the picture first, so that the manifest never names what is not there. A
 /// picture that the manifest does not name is another one, and stays.
-fn save_mask(session: &Path, stroked: Stroked, tools: &mut Tools, out: &Outbox) {
+fn save_mask(session: &Path, edited: EditedMask, tools: &mut Tools, out: &Outbox) {
     let saved = || -> Result<(), Box<dyn std::error::Error>> {
         let _lock = Lock::acquire(session, "edit")?;
         let mut manifest = Session::load(session)?;
         let file = mask_file(&manifest);
         let path = session.join(&file);
-        let bytes = encode_png_grey8(&drafts::in_grey(&stroked.mask))
+        let bytes = encode_png_grey8(&drafts::in_grey(&edited.mask))
             .map_err(|error| FileError::write(&path, error))?;
         write_atomic(&path, &bytes)?;
         if manifest.mask.as_ref() != Some(&file) {
@@ -206,7 +206,7 @@ fn save_mask(session: &Path, stroked: Stroked, tools: &mut Tools, out: &Outbox) 
     match saved() {
         Ok(()) => {
             tools.frames = Frames::default();
-            out.send(Update::Look(Event::MaskSaved(stroked.key, stroked.version)));
+            out.send(Update::Look(Event::MaskSaved(edited.key, edited.version)));
         }
         Err(error) => out.fail(texts::SAVING_MASK, &error),
     }

@@ -91,7 +91,7 @@ fn find_session(
     project: Option<&Project>,
     report: &Report,
 ) -> Result<Found<Session>, String> {
-    let told = report.folders.as_ref().map(|folders| PathBuf::from(&folders.session));
+    let stated = report.folders.as_ref().map(|folders| PathBuf::from(&folders.session));
     let name = folder.file_name().unwrap_or_default();
     let of_place = project.map(|project| project.scans().join(name));
     let of_its_rig = rig_of(folder).map(|rig| rig.join("scans").join(name));
@@ -107,10 +107,10 @@ fn find_session(
         }
         Err(_) => None,
     };
-    let found = best([told.clone(), of_place, of_its_rig].into_iter().flatten(), &mut read);
-    found.ok_or_else(|| match (broken, told) {
+    let found = best([stated.clone(), of_place, of_its_rig].into_iter().flatten(), &mut read);
+    found.ok_or_else(|| match (broken, stated) {
         (Some(why), _) => why,
-        (None, Some(told)) => texts::frames_gone(&told),
+        (None, Some(stated)) => texts::frames_gone(&stated),
         (None, None) => texts::NO_FRAMES.to_owned(),
     })
 }
@@ -120,10 +120,10 @@ fn find_calibration(
     project: Option<&Project>,
     report: &Report,
 ) -> Option<Found<()>> {
-    let told = report.folders.as_ref().map(|folders| PathBuf::from(&folders.calibration));
+    let stated = report.folders.as_ref().map(|folders| PathBuf::from(&folders.calibration));
     let of_its_rig = rig_of(folder).map(|rig| rig.join("calibration"));
     let folders =
-        [told, project.map(|project| project.calibration()), of_its_rig].into_iter().flatten();
+        [stated, project.map(|project| project.calibration()), of_its_rig].into_iter().flatten();
     best(folders, &mut |folder: PathBuf| {
         let mut of_calibration = report
             .inputs

@@ -105,10 +105,10 @@ impl Writer {
     fn start(folder: PathBuf) -> Self {
         let (changes, inbox) = mpsc::channel();
         let (outbox, troubles) = mpsc::channel();
-        let told = outbox.clone();
+        let failure = outbox.clone();
         let thread = spawn("drafts", move || write_all(&inbox, &outbox));
         let thread = thread.inspect_err(|error| {
-            let _ = told.send(no_thread(threads::STROKES, error));
+            let _ = failure.send(no_thread(threads::STROKES, error));
         });
         let thread = thread.ok();
         Self { folder, changes: Some(changes), troubles, thread }

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use weavelight::solve::Photosite;
 use weavelight_calibration::description::Image;
 
-/// What this room asks of the worker.
+/// Requests of the Look room.
 #[derive(Debug)]
 pub enum Command {
     /// Look at the solution in this folder.
@@ -30,7 +30,7 @@ pub enum Command {
     /// Solve one photosite again: which lights does it rest on?
     Photosite(Sources, [usize; 2]),
     /// Save the mask of a capture session.
-    Mask(Sources, Stroked),
+    Mask(Sources, EditedMask),
     /// The strokes in a file that were not saved.
     Draft(PathBuf),
     /// Solve the capture session in this folder, which has no solution yet, and look at that.
@@ -41,7 +41,7 @@ pub enum Command {
 
 /// A mask as it is when it is saved.
 #[derive(Debug)]
-pub struct Stroked {
+pub struct EditedMask {
     /// What is inside.
     pub mask: Image<bool>,
     /// Of which picture.
@@ -50,7 +50,7 @@ pub struct Stroked {
     pub version: u64,
 }
 
-/// What the worker tells this room.
+/// Updates for the Look room.
 #[derive(Debug)]
 pub enum Event {
     /// A solution is there.

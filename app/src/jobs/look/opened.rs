@@ -92,19 +92,19 @@ pub(crate) enum OpenError {
     },
 }
 
-/// Reads a solution. `tell` is told the share done and the step.
+/// Reads a solution. `progress` gets the share done and the step.
 ///
 /// # Errors
 /// Where it is no solution, or its maps are broken.
 pub(crate) fn open(
     folder: &Path,
     project: Option<&Project>,
-    tell: &dyn Fn(f64, &str),
+    progress: &dyn Fn(f64, &str),
 ) -> Result<Opened, OpenError> {
-    tell(0.0, NORMAL_EXR);
+    progress(0.0, NORMAL_EXR);
     let solution = Solution::load(folder)?;
     let surface = read_surface(folder)?;
-    tell(0.5, ALBEDO_EXR);
+    progress(0.5, ALBEDO_EXR);
     let report = solution.report;
     let plane = Plane {
         point_mm: Point3::from(report.plane.point_mm),
@@ -122,7 +122,7 @@ pub(crate) fn open(
     let shade = shade.transpose()?.map(|[shade]| shade);
     let shade = |k: usize| shade.map_or(1.0, |shade| shade[k]);
     let maps = Maps::over(surface, &|k| [r[k], g[k], b[k]], &shade, geometry);
-    tell(0.9, "");
+    progress(0.9, "");
     let frames = capture_of(folder, project, &report);
     Ok(Opened {
         name: folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -28,7 +28,7 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
     }
 }
 
-/// What we hold ourselves would be told as busy, so it is let go first.
+/// Closes board and camera first: those that this program holds would be reported as busy.
 fn find(tools: &mut Tools, out: &Outbox) {
     tools.instruments = None;
     let Some(project) = &tools.project else { return };

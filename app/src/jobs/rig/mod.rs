@@ -7,7 +7,7 @@ use weavelight::device::scan::CameraFinding;
 use weavelight::doctor::LightBoard;
 use weavelight::instrument::CalibratedLight;
 
-/// What this room asks of the worker.
+/// Requests of the Rig room.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Look for board and camera.
@@ -20,7 +20,7 @@ pub enum Command {
     ReadCalibration(Box<Project>),
 }
 
-/// What the worker tells this room.
+/// Updates for the Rig room.
 #[derive(Debug)]
 pub enum Event {
     /// What was found.

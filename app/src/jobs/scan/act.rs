@@ -110,7 +110,7 @@ fn folder_for(order: &Order, project: &Project) -> Result<PathBuf, String> {
     match &order.what {
         What::Resume(folder) | What::Again(folder) => Ok(folder.clone()),
         What::New => {
-            let taken = project.taken();
+            let taken = project.names();
             match taken.has(&order.name) {
                 true => Err(texts::TAKEN.to_owned()),
                 false => Ok(project.scans().join(taken.free(&order.name))),

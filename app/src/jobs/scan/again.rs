@@ -1,13 +1,13 @@
 //! A scan that is taken again: the earlier one and its solution go to the bin together, and come back with *Undo*; then the
 //! later one is in the bin.
 
-use crate::jobs::bin::{BinError, Binned};
+use crate::jobs::bin::{BinError, BinnedFolders};
 use crate::jobs::messages::Update;
 use crate::jobs::outbox::Outbox;
 use crate::jobs::scan::live_preview::LivePreview;
 use crate::jobs::scan::live_preview::look_at_what_is_there;
 use crate::jobs::scan::unfinished::look_for_unfinished;
-use crate::jobs::scan::{Event, Swapped};
+use crate::jobs::scan::{Event, RestoredScan};
 use crate::jobs::scans;
 use crate::jobs::scans::Deleted;
 use crate::jobs::tools::Tools;
@@ -24,7 +24,7 @@ pub(crate) fn put_aside(
     project: &Project,
     out: &Outbox,
 ) -> Result<Option<Deleted>, BinError> {
-    let binned = Binned::put([folder.to_owned(), project.solution(folder)])?;
+    let binned = BinnedFolders::put([folder.to_owned(), project.solution(folder)])?;
     if binned.folders.is_empty() {
         return Ok(None);
     }
@@ -38,7 +38,7 @@ pub(crate) fn put_aside(
 pub(crate) fn undo(replaced: Deleted, tools: &mut Tools, out: &Outbox) {
     let Some(project) = tools.project.clone() else { return };
     match swap(replaced, &project, out) {
-        Ok(swapped) => show(swapped, &project, out),
+        Ok(restored) => show(restored, &project, out),
         Err(error) => out.fail(texts::BRINGING_BACK, &error),
     }
     look_for_unfinished(tools, out);
@@ -57,9 +57,9 @@ pub(crate) fn put_back_if_nothing_came(
     }
 }
 
-fn swap(earlier: Deleted, project: &Project, out: &Outbox) -> Result<Swapped, BinError> {
+fn swap(earlier: Deleted, project: &Project, out: &Outbox) -> Result<RestoredScan, BinError> {
     let folder = earlier.folder.clone();
-    let later = Binned::put([folder.clone(), project.solution(&folder)])?;
+    let later = BinnedFolders::put([folder.clone(), project.solution(&folder)])?;
     if let Err(error) = earlier.binned.bring_back() {
         // As it was before.
         let _ = later.bring_back();
@@ -73,12 +73,12 @@ fn swap(earlier: Deleted, project: &Project, out: &Outbox) -> Result<Swapped, Bi
     if let Some(replaced) = &replaced {
         out.send(Update::Scans(scans::Event::Deleted(replaced.clone())));
     }
-    Ok(Swapped { folder, solution: report.map(|report| (solution, report)), replaced })
+    Ok(RestoredScan { folder, solution: report.map(|report| (solution, report)), replaced })
 }
 
 /// What takes the place of the scan that the room shows, after an undo.
-pub(crate) fn show(swapped: Swapped, project: &Project, out: &Outbox) {
-    let folder = swapped.folder.clone();
-    out.send(Update::Scan(Event::Swapped(swapped)));
+pub(crate) fn show(restored: RestoredScan, project: &Project, out: &Outbox) {
+    let folder = restored.folder.clone();
+    out.send(Update::Scan(Event::Restored(restored)));
     look_at_what_is_there(&folder, &LivePreview::open(project, &folder, out));
 }

@@ -1,5 +1,5 @@
-//! What can be seen of a scan while it goes on: each frame made small, and the maps from the frames so far. A thread of its
-//! own, so that the next light does not wait for it; it ends with the scan.
+//! Live preview of a scan: a thumbnail of each frame, and maps from the frames so far. Runs in its own thread, so that the next
+//! light does not wait; ends with the scan.
 
 use crate::jobs::messages::Update;
 use crate::jobs::outbox::Outbox;
@@ -24,7 +24,7 @@ use weavelight::session::Session;
 use weavelight::solution::Scale;
 use weavelight_calibration::description::{Camera, Plane};
 
-/// A frame that is safe.
+/// A frame that is on the disk.
 #[derive(Debug)]
 pub(crate) struct KeptFrame {
     pub(crate) light: Option<usize>,
@@ -35,7 +35,7 @@ pub(crate) struct KeptFrame {
     pub(crate) hint: Hint,
 }
 
-/// Looks at frames as they come.
+/// Makes previews of frames as they arrive.
 pub(crate) struct LivePreview {
     frames: Option<Sender<KeptFrame>>,
     thread: Option<JoinHandle<()>>,
@@ -59,7 +59,7 @@ impl LivePreview {
     }
 
     pub(crate) fn add(&self, kept: KeptFrame) {
-        // A thread that stumbled over a frame leaves the scan alone.
+        // Where the thread has failed on a frame, the scan goes on without previews.
         let _ = self.frames.as_ref().map(|frames| frames.send(kept));
     }
 }
@@ -116,7 +116,7 @@ impl Sums {
         Self { sums, camera: calibration.camera.clone(), plane, scale }
     }
 
-    /// What does not fit is told by the solve, with its remedy.
+    /// A frame that does not fit is left out here; the solve reports it with its remedy.
     fn add(&mut self, kept: KeptFrame, frame: Frame) -> Option<()> {
         let Settings { exposure_s, iso } = kept.settings;
         let exposure = Exposure { frame, exposure_s, iso, path: kept.file };

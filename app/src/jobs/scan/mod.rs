@@ -7,7 +7,7 @@ pub mod solve;
 mod unfinished;
 
 use crate::jobs::scans::Deleted;
-use crate::model::names::Taken;
+use crate::model::names::ScanNames;
 use crate::model::scan_entry::UnfinishedScan;
 use crate::model::settings::SolveSettings;
 use crate::viewer::maps::Maps;
@@ -20,7 +20,7 @@ use weavelight_sim::cloth::Preset;
 
 /// A scan that has come back.
 #[derive(Debug)]
-pub struct Swapped {
+pub struct RestoredScan {
     /// Its folder.
     pub folder: PathBuf,
     /// Its solution, and what that says of itself; `None` where it was not solved.
@@ -29,7 +29,7 @@ pub struct Swapped {
     pub replaced: Option<Deleted>,
 }
 
-/// What this room asks of the worker.
+/// Requests of the Scan room.
 #[derive(Debug)]
 pub enum Command {
     /// A picture under one light.
@@ -84,19 +84,19 @@ pub enum What {
     Again(PathBuf),
 }
 
-/// What the worker tells this room.
+/// Updates for the Scan room.
 #[derive(Debug)]
 pub enum Event {
     /// A test shot.
     TestShot(Box<Preview>),
     /// The names that the scans of the rig in a folder have.
-    Taken(PathBuf, Taken),
+    Names(PathBuf, ScanNames),
     /// The scan's folder.
     Begun(PathBuf),
     /// What is scanned again is in the bin.
     Replaced(Option<Deleted>),
     /// Another scan is in the place of the one that was shown.
-    Swapped(Swapped),
+    Restored(RestoredScan),
     /// The frame that is being taken, as in "light 4".
     Taking(String),
     /// It rests.

@@ -37,7 +37,7 @@ pub fn solve(
         return None;
     };
     let solution = project.solution(scan);
-    // Nobody asks for the page where the maps are there already.
+    // The page is made only if the maps are not up to date.
     let expected = OnceLock::new();
     let solved = out.job(&title, || -> Result<Solved, Box<dyn std::error::Error>> {
         std::fs::create_dir_all(solution.parent().unwrap_or(Path::new(".")))?;

@@ -18,7 +18,7 @@ pub(crate) fn look_for_unfinished(tools: &Tools, out: &Outbox) {
 }
 
 pub(crate) fn send_names(project: &Project, out: &Outbox) {
-    out.send(Update::Scan(Event::Taken(project.folder.clone(), project.taken())));
+    out.send(Update::Scan(Event::Names(project.folder.clone(), project.names())));
 }
 
 /// The newest scan that was stopped, by whatever.

@@ -1,6 +1,6 @@
 //! The worker's part of the Scans room.
 
-use crate::jobs::bin::Binned;
+use crate::jobs::bin::BinnedFolders;
 use crate::jobs::messages::Update;
 use crate::jobs::outbox::Outbox;
 use crate::jobs::scan;
@@ -46,7 +46,7 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
 
 fn tell_list(project: &Project, out: &Outbox) {
     out.send(Update::Scans(Event::List(project.folder.clone(), list(project))));
-    out.send(Update::Scan(scan::Event::Taken(project.folder.clone(), project.taken())));
+    out.send(Update::Scan(scan::Event::Names(project.folder.clone(), project.names())));
 }
 
 /// The first light's frame made small; kept as a file beside the scans, for the next time.
@@ -85,7 +85,7 @@ fn keep(picture: &ColorImage, file: &Path) {
 
 fn delete(entry: ScanEntry, out: &Outbox) {
     let ScanEntry { name, folder, solution, .. } = entry;
-    match Binned::put(std::iter::once(folder.clone()).chain(solution)) {
+    match BinnedFolders::put(std::iter::once(folder.clone()).chain(solution)) {
         // It was deleted already, by a click too many or by hand.
         Ok(binned) if binned.folders.is_empty() => {}
         Ok(binned) => {

@@ -3,7 +3,7 @@
 pub mod act;
 pub mod list;
 
-use crate::jobs::bin::Binned;
+use crate::jobs::bin::BinnedFolders;
 use crate::model::project::Project;
 use crate::model::scan_entry::ScanEntry;
 use crate::model::settings::SolveSettings;
@@ -19,10 +19,10 @@ pub struct Deleted {
     /// The scan's folder, as it was.
     pub folder: PathBuf,
     /// Both, where they are now.
-    pub binned: Binned,
+    pub binned: BinnedFolders,
 }
 
-/// What this room asks of the worker.
+/// Requests of the Scans room.
 #[derive(Debug)]
 pub enum Command {
     /// What there is of a rig.
@@ -51,7 +51,7 @@ pub enum Command {
     },
 }
 
-/// What the worker tells this room.
+/// Updates for the Scans room.
 #[derive(Debug)]
 pub enum Event {
     /// What there is of the rig in a folder.

@@ -52,7 +52,7 @@ fn boards(ui: &mut egui::Ui, state: &State) {
     });
 }
 
-/// Which sheets are there, how well they tell where the lights are, and what the next one brings.
+/// Which sheets are there, how well they locate the lights, and what the next one improves.
 fn sheets(ui: &mut egui::Ui, state: &State) {
     let taken = Pose::FIT.iter().filter(|pose| state.sheets.contains(pose)).count();
     let text = texts::sheets(taken, Pose::FIT.len());

@@ -28,7 +28,7 @@ pub struct Calibrate {
     asked: bool,
     /// The first look at what is there was ended.
     stopped: bool,
-    /// Go on by itself, on the simulated rig.
+    /// Take the next picture without a click, on the simulated rig.
     auto: bool,
     live: Live,
     browse: Browse,
@@ -43,7 +43,7 @@ pub struct Calibrate {
     kept: Option<PathBuf>,
 }
 
-/// One look after the other, while somebody moves a board about.
+/// Test shots one after the other, while the board is moved.
 #[derive(Debug, Default)]
 struct Live {
     on: bool,
@@ -132,7 +132,7 @@ impl Calibrate {
         Some(if check { Task::Sheet(Pose::Check) } else { next })
     }
 
-    /// Leaves something to the worker; what was told of the last thing is put away.
+    /// Makes a request; the outcome of the last one is no longer shown.
     fn ask(&mut self, ask: Command, app: &mut AppState) {
         (self.trouble, self.kept) = (None, None);
         app.request(Request::Calibrate(ask));
@@ -154,9 +154,13 @@ impl Calibrate {
         ui.separator();
         view::age(ui, state, &mut app.settings.targets);
         let anything = state.begun || state.age_days.is_some();
-        let anew = egui::Button::new(texts::ANEW);
-        if ui.add_enabled(free && anything, anew).on_hover_text(texts::ANEW_HINT).clicked() {
-            wanted = Some(Command::Anew);
+        let start_over = egui::Button::new(texts::START_OVER);
+        if ui
+            .add_enabled(free && anything, start_over)
+            .on_hover_text(texts::START_OVER_HINT)
+            .clicked()
+        {
+            wanted = Some(Command::StartOver);
         }
         ui.separator();
         let entry = view::history(ui, state, free);
@@ -168,7 +172,7 @@ impl Calibrate {
     /// What to do now, and the button that does it. Whether there is a picture to come.
     fn task(&mut self, ui: &mut egui::Ui, task: Task, app: &mut AppState) -> bool {
         let Some(state) = &self.state else { return false };
-        let simulated = app.project.as_ref().is_some_and(view::lays_by_itself);
+        let simulated = app.project.as_ref().is_some_and(view::places_targets);
         view::instructions(ui, task, state, simulated);
         view::outcome(ui, self.trouble.as_deref(), self.kept.as_deref());
         if task == Task::Done {

@@ -80,8 +80,8 @@ fn nothing_yet(ui: &mut egui::Ui) {
     });
 }
 
-/// Whether the program lays the targets on the table by itself.
-pub(super) fn lays_by_itself(place: &Project) -> bool {
+/// Whether the program places the targets: on a simulated rig.
+pub(super) fn places_targets(place: &Project) -> bool {
     place.rig.camera.kind == CameraKind::Simulated
 }
 

@@ -5,14 +5,14 @@ use crate::jobs::messages::Request;
 use crate::jobs::state::AppState;
 use crate::rooms::look::lamp::Kind;
 use crate::rooms::look::legend::{line, tag};
-use crate::rooms::look::{Look, Taken, Tool};
+use crate::rooms::look::{Look, PickedPhotosite, Tool};
 use crate::texts::look as texts;
 use crate::ui::theme;
 use crate::ui::theme::meaning;
 use crate::viewer::appearance::Compose;
 use crate::viewer::canvas::Canvas as MapCanvas;
 use crate::viewer::geometry::Geometry;
-use crate::viewer::map_view::Shown;
+use crate::viewer::map_view::MapArea;
 use crate::viewer::map_view::can_draw;
 use crate::viewer::profile::along;
 use eframe::egui;
@@ -91,7 +91,7 @@ impl Look {
         self.legend(ui, &shown);
     }
 
-    fn hovered(&mut self, shown: &Shown, size: [usize; 2]) {
+    fn hovered(&mut self, shown: &MapArea, size: [usize; 2]) {
         let under = shown.response.hover_pos().map(|at| shown.viewport.pixel_at(at, shown.rect));
         let hovered = under.and_then(|at| inside(at, size));
         if hovered != self.canvas.hovered {
@@ -102,7 +102,7 @@ impl Look {
     }
 
     /// Moves the light; a click takes a photosite.
-    fn hand(&mut self, ui: &Ui, shown: &Shown, geometry: &Geometry, app: &mut AppState) {
+    fn hand(&mut self, ui: &Ui, shown: &MapArea, geometry: &Geometry, app: &mut AppState) {
         let response = &shown.response;
         if self.light_is_in_hand() {
             if is_dragged(response)
@@ -126,7 +126,7 @@ impl Look {
         }
     }
 
-    fn carry_light(&mut self, at: Pos2, shown: &Shown, geometry: &Geometry) {
+    fn carry_light(&mut self, at: Pos2, shown: &MapArea, geometry: &Geometry) {
         if self.lamp.kind == Kind::Sun {
             let rect = shown.rect;
             let from_middle = (at - rect.center()) / (0.5 * rect.size().min_elem());
@@ -148,10 +148,10 @@ impl Look {
         if let Some(capture) = capture {
             app.request(Request::Look(Command::Photosite(capture.sources.clone(), at)));
         }
-        self.taken = Some(Taken { at, found });
+        self.taken = Some(PickedPhotosite { at, found });
     }
 
-    fn draw_line(&mut self, shown: &Shown) {
+    fn draw_line(&mut self, shown: &MapArea) {
         let response = &shown.response;
         let Some(at) = shown.pixel_under_mouse() else { return };
         if response.drag_started_by(egui::PointerButton::Primary) {
@@ -180,7 +180,7 @@ impl Look {
     }
 
     /// Draws with the mouse; with the button let go, that is a step of the mask.
-    fn paint(&mut self, shown: &Shown, size: [usize; 2]) {
+    fn paint(&mut self, shown: &MapArea, size: [usize; 2]) {
         let response = &shown.response;
         if response.hovered() {
             response.ctx.set_cursor_icon(CursorIcon::Crosshair);
@@ -221,7 +221,7 @@ impl Look {
         }
     }
 
-    fn show_mask(&mut self, ui: &Ui, shown: &Shown) {
+    fn show_mask(&mut self, ui: &Ui, shown: &MapArea) {
         let Some(painting) = &self.painting else { return };
         let canvas = &mut self.canvas;
         let viewport = shown.viewport;
@@ -266,7 +266,7 @@ impl Look {
     }
 
     /// The lamp, the sun, or the rig's light, where it is.
-    fn show_light(&self, ui: &Ui, shown: &Shown, geometry: &Geometry) {
+    fn show_light(&self, ui: &Ui, shown: &MapArea, geometry: &Geometry) {
         if !self.layers.shows(crate::rooms::look::layer::Layer::Relit) {
             return;
         }
@@ -310,7 +310,7 @@ impl Look {
         }
     }
 
-    fn show_line(&self, ui: &Ui, shown: &Shown) {
+    fn show_line(&self, ui: &Ui, shown: &MapArea) {
         let (Some(ends), Some(profile)) = (self.line, &self.profile) else { return };
         let [from, to] = ends.map(|at| shown.viewport.screen_of(at, shown.rect));
         line(ui.painter(), [from, to], meaning::LIT);
@@ -326,7 +326,7 @@ impl Look {
         tag(ui, from + (to - from) / 2.0 + vec2(0.0, -16.0), Align2::CENTER_BOTTOM, &length);
     }
 
-    fn show_taken(&self, ui: &Ui, shown: &Shown) {
+    fn show_taken(&self, ui: &Ui, shown: &MapArea) {
         let Some(taken) = &self.taken else { return };
         let [x, y] = taken.at.map(|c| c as f64);
         let rect = Rect::from_two_pos(
@@ -340,7 +340,7 @@ impl Look {
     }
 
     /// The line between two sides is dragged.
-    fn move_divider(&mut self, ui: &Ui, shown: &Shown) {
+    fn move_divider(&mut self, ui: &Ui, shown: &MapArea) {
         if self.layers.compose != Compose::Split {
             return;
         }
@@ -358,13 +358,13 @@ impl Look {
         }
     }
 
-    fn divider_ends(&self, shown: &Shown) -> [Pos2; 2] {
+    fn divider_ends(&self, shown: &MapArea) -> [Pos2; 2] {
         let x = shown.rect.left() + self.layers.divider * shown.rect.width();
         [pos2(x, shown.rect.top()), pos2(x, shown.rect.bottom())]
     }
 
     /// The line between two sides.
-    fn divider(&self, ui: &Ui, shown: &Shown) {
+    fn divider(&self, ui: &Ui, shown: &MapArea) {
         if self.layers.compose != Compose::Split {
             return;
         }
@@ -376,7 +376,7 @@ impl Look {
     }
 
     /// What each side shows, where there are two; and what is still being made.
-    fn captions(&self, ui: &Ui, shown: &Shown) {
+    fn captions(&self, ui: &Ui, shown: &MapArea) {
         let rect = shown.rect.shrink(theme::GAP + 4.0);
         let named = |k: usize| {
             let layer = self.layers.sides[k];
@@ -418,7 +418,7 @@ impl Canvas {
 
     /// Follows the first button through everything that happened since the last frame: where frames are slow, a whole stroke.
     /// True when the button was let go.
-    fn follow(&mut self, shown: &Shown) -> bool {
+    fn follow(&mut self, shown: &MapArea) -> bool {
         let response = &shown.response;
         let ctx = &response.ctx;
         let first = egui::PointerButton::Primary;
@@ -470,7 +470,7 @@ fn inside(at: [f64; 2], size: [usize; 2]) -> Option<[usize; 2]> {
 }
 
 /// What is outside the mask, as it is seen.
-fn overlay(mask: &weavelight_calibration::description::Image<bool>, shown: &Shown) -> ColorImage {
+fn overlay(mask: &weavelight_calibration::description::Image<bool>, shown: &MapArea) -> ColorImage {
     let (columns, rows) = (
         (shown.rect.width() / OVERLAY_STEP).ceil().max(1.0) as usize,
         (shown.rect.height() / OVERLAY_STEP).ceil().max(1.0) as usize,

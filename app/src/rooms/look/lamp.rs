@@ -22,7 +22,6 @@ pub(super) enum Kind {
 /// The light.
 #[derive(Clone, Debug)]
 pub(super) struct Lamp {
-    /// Which.
     pub(super) kind: Kind,
     /// Where the lamp hangs over the plane, rig frame, millimetres.
     pub(super) at_mm: [f64; 2],
@@ -36,7 +35,6 @@ pub(super) struct Lamp {
     pub(super) moves: bool,
     /// Which of the rig's.
     pub(super) light: usize,
-    /// Brightness, stops.
     pub(super) stops: f32,
     /// Gloss, 0 for none.
     pub(super) gloss: f32,

@@ -6,14 +6,13 @@ use crate::texts::look as texts;
 use crate::ui::theme;
 use crate::viewer::appearance::Compose;
 use crate::viewer::geometry::Geometry;
-use crate::viewer::map_view::Shown;
+use crate::viewer::map_view::MapArea;
 use crate::viewer::scales;
 use eframe::egui;
 use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, Vec2, pos2, vec2};
 
 /// Size of a scale, points.
 const SCALE: Vec2 = vec2(160.0, 10.0);
-/// Space around.
 const INSET: f32 = 12.0;
 /// Height of what stands on one line.
 const LINE: f32 = 16.0;
@@ -27,7 +26,7 @@ struct Scale {
 }
 
 impl Look {
-    pub(super) fn legend(&self, ui: &Ui, shown: &Shown) {
+    pub(super) fn legend(&self, ui: &Ui, shown: &MapArea) {
         let scales: Vec<Scale> = match self.layers.compose {
             Compose::Difference => vec![self.difference()],
             _ => self.layers.seen().iter().filter_map(|layer| self.scale(*layer)).collect(),
@@ -94,7 +93,7 @@ fn draw_scale(ui: &Ui, at: Pos2, scale: &Scale) {
 }
 
 /// A round number of millimetres, about a sixth of the width.
-fn draw_ruler(ui: &Ui, shown: &Shown, geometry: &Geometry) {
+fn draw_ruler(ui: &Ui, shown: &MapArea, geometry: &Geometry) {
     let points_per_mm = f64::from(shown.viewport.zoom) / geometry.mm_per_px();
     let length_mm = round_length(f64::from(shown.rect.width()) / 6.0 / points_per_mm);
     let length = (length_mm * points_per_mm) as f32;

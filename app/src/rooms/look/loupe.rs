@@ -48,7 +48,7 @@ impl Look {
     }
 
     /// Which lights the photosite that was clicked rests on, and why not on the others.
-    fn lights_of(&self, ui: &mut Ui, taken: &crate::rooms::look::Taken) {
+    fn lights_of(&self, ui: &mut Ui, taken: &crate::rooms::look::PickedPhotosite) {
         ui.label(RichText::new(texts::photosite(taken.at)).strong());
         let changed = self.opened.as_ref().and_then(|o| o.capture()).map(|c| c.changed);
         match (&taken.found, changed) {

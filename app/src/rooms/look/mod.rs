@@ -74,7 +74,7 @@ pub struct Look {
     residual: Option<(usize, Arc<Pyramid>)>,
     /// What was asked of the worker and has not come yet.
     awaited: Option<Awaited>,
-    taken: Option<Taken>,
+    taken: Option<PickedPhotosite>,
     line: Option<edits::Ends>,
     profile: Option<profile::Profile>,
     painting: Option<Painting>,
@@ -106,7 +106,7 @@ enum Awaited {
 
 /// The photosite that was clicked.
 #[derive(Debug)]
-struct Taken {
+struct PickedPhotosite {
     at: [usize; 2],
     /// `None` until it comes.
     found: Option<Option<Box<Photosite>>>,

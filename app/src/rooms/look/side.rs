@@ -1,7 +1,7 @@
 //! The panel beside the maps: what is shown, the light, the photosite, the slopes, the mask.
 
 use crate::jobs::look::opened::Opened;
-use crate::jobs::look::{Command, Stroked};
+use crate::jobs::look::{Command, EditedMask};
 use crate::jobs::messages::Request;
 use crate::jobs::state::AppState;
 use crate::model::number::Unit;
@@ -243,8 +243,9 @@ impl Look {
         let save = ui.add_enabled(ready, Button::new(texts::SAVE_AND_SOLVE));
         if save.on_disabled_hover_text(texts::PAINT_FIRST).clicked() {
             let (sources, key) = (capture.sources.clone(), capture.key.clone());
-            let stroked = Stroked { mask: painting.mask().clone(), key, version: painting.version };
-            app.request(Request::Look(Command::Mask(sources.clone(), stroked)));
+            let edited =
+                EditedMask { mask: painting.mask().clone(), key, version: painting.version };
+            app.request(Request::Look(Command::Mask(sources.clone(), edited)));
             let (folder, how) = (opened.folder.clone(), as_it_was(opened, app.settings.solve));
             app.request(Request::Look(Command::Solve(sources, folder, how)));
         }

@@ -4,7 +4,7 @@
 use eframe::egui;
 use std::time::Duration;
 
-/// For so long nobody can have meant a button that has just appeared, seconds: the second click of a double one, and a click on
+/// A click so soon after a button appeared was not meant for it, seconds: the second click of a double one, or a click on
 /// what stood there before.
 const NEW_S: f64 = 0.6;
 

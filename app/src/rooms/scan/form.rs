@@ -72,7 +72,7 @@ impl Form {
         if self.fabric != before {
             app.request(Request::Scan(Command::LayOut(self.fabric)));
             app.settings.scan.name = self.fabric.name().to_owned();
-            app.settings.scan.next_free_name(&app.taken);
+            app.settings.scan.next_free_name(&app.names);
         }
     }
 
@@ -109,7 +109,7 @@ impl Form {
             false => widgets::large(ui, text, size, self.can_go(app, done)),
         };
         let clicked = button.clicked();
-        let taken = !done && app.taken.has(app.settings.scan.name.trim());
+        let taken = !done && app.names.has(app.settings.scan.name.trim());
         let hint = match (!app.can_change(), taken, self.unread && !done) {
             (true, ..) => texts::BUSY,
             (_, true, _) => texts::TAKEN,
@@ -123,7 +123,7 @@ impl Form {
     /// Whether the big button can be pressed.
     pub(super) fn can_go(&self, app: &AppState, done: bool) -> bool {
         let name = app.settings.scan.name.trim();
-        let free = !name.is_empty() && !app.taken.has(name);
+        let free = !name.is_empty() && !app.names.has(name);
         app.can_change() && (done || (free && !self.unread))
     }
 }

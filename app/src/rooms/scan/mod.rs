@@ -12,7 +12,7 @@ use crate::jobs::messages::{Request, Update};
 use crate::jobs::scan::{Command, Event, Order, What};
 use crate::jobs::scans::Deleted;
 use crate::jobs::state::AppState;
-use crate::model::names::Taken;
+use crate::model::names::ScanNames;
 use crate::model::room::Room;
 use crate::model::scan_entry::UnfinishedScan;
 use crate::rooms::RoomPanel;
@@ -93,7 +93,7 @@ impl RoomPanel for Scan {
 
     fn rig_opened(&mut self, app: &mut AppState) {
         *self = Self { count_on: true, ..Self::default() };
-        app.taken = Taken::default();
+        app.names = ScanNames::default();
         app.request(Request::Scan(Command::LookForUnfinished));
     }
 
@@ -176,7 +176,7 @@ impl Scan {
         if !self.is_done(app) {
             return self.begin(order(app), app);
         }
-        app.settings.scan.next_free_name(&app.taken);
+        app.settings.scan.next_free_name(&app.names);
         self.clear();
         self.stage = Stage::Ready;
         (self.about, self.replaced) = (None, None);
@@ -279,14 +279,14 @@ impl Scan {
             Event::Paused => self.stage = Stage::Paused,
             Event::Frame(thumb) => self.strip.add(*thumb),
             Event::Maps(maps) => self.view.show_maps(maps),
-            Event::Taken(of, taken) => self.hear_taken(&of, taken, app),
+            Event::Names(of, taken) => self.take_names(&of, taken, app),
             Event::Begun(folder) => {
                 if let Some(about) = &mut self.about {
                     about.folder = Some(folder);
                 }
             }
             Event::Replaced(replaced) => self.replaced = replaced,
-            Event::Swapped(swapped) => self.swap(swapped),
+            Event::Restored(restored) => self.show_restored(restored),
             Event::Complete(summary) => {
                 if let Some(used) = summary.settings {
                     app.settings.scan.exposure_s = used.exposure_s;
@@ -317,13 +317,13 @@ impl Scan {
         }
     }
 
-    fn hear_taken(&mut self, of: &Path, taken: Taken, app: &mut AppState) {
+    fn take_names(&mut self, of: &Path, names: ScanNames, app: &mut AppState) {
         if app.project.as_ref().is_none_or(|place| place.folder != of) {
             return;
         }
-        app.taken = taken;
+        app.names = names;
         if std::mem::take(&mut self.count_on) {
-            app.settings.scan.next_free_name(&app.taken);
+            app.settings.scan.next_free_name(&app.names);
         }
     }
 
@@ -340,7 +340,7 @@ impl Scan {
     }
 }
 
-/// An old calibration makes maps that nobody should trust blindly.
+/// Maps from an old calibration may be wrong.
 fn tell_expired(ui: &mut egui::Ui, app: &mut AppState) {
     let Some(days) = app.expired_days() else { return };
     ui.horizontal_top(|ui| {

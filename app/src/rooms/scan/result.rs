@@ -1,7 +1,7 @@
 //! What came of a scan, and what can be done with it: all of it about the scan that is shown, not about what the form says.
 
 use crate::jobs::messages::Request;
-use crate::jobs::scan::{Command, Order, Swapped, What};
+use crate::jobs::scan::{Command, Order, RestoredScan, What};
 use crate::jobs::state::AppState;
 use crate::model::project::Project;
 use crate::rooms::scan::form::order;
@@ -98,7 +98,10 @@ impl Scan {
     }
 
     /// The scan of that name that was in the bin is the one that is shown.
-    pub(super) fn swap(&mut self, Swapped { folder, solution, replaced }: Swapped) {
+    pub(super) fn show_restored(
+        &mut self,
+        RestoredScan { folder, solution, replaced }: RestoredScan,
+    ) {
         self.clear();
         let of = |about: &About| about.folder.as_ref() == Some(&folder);
         if !self.about.as_ref().is_some_and(of) {

@@ -394,7 +394,7 @@ impl Scans {
     }
 }
 
-/// Where the maps go if nobody says otherwise.
+/// The default folder of an export.
 fn export_folder(entry: &ScanEntry, app: &AppState) -> PathBuf {
     app.settings.home.join("exports").join(export_name(entry))
 }
