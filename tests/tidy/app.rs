@@ -202,8 +202,6 @@ fn circles_are_found() {
     assert_eq!(circles(edges(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])), ["a", "b", "c"]);
     let code = "use super::{a::{self, B}, c as d};\nuse crate::x::Y;\nlet _ = crate::z::f();";
     let paths = paths_of(code, "rooms/look/side");
-    assert_eq!(
-        paths,
-        ["rooms/look/a/self", "rooms/look/a/B", "rooms/look/c", "x/Y", "x/Y", "z/f", "rooms/look"]
-    );
+    let expected = ["rooms/look/a/self", "rooms/look/a/B", "rooms/look/c", "x/Y", "x/Y", "z/f"];
+    assert_eq!(paths, expected);
 }
