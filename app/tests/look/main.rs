@@ -282,7 +282,7 @@ fn the_frames_of_a_solution_are_found_wherever_they_are() {
     std::fs::rename(&scan, scan.with_file_name("moved")).unwrap();
     bench::open_another(&mut window, &solution);
     bench::wait(&mut window, "that the frames are gone", |window| {
-        window.query_by_label_contains("No frames. Its scan is not at").is_some()
+        window.query_by_label_contains("No frames. Its scan is no longer at").is_some()
     });
 }
 

@@ -33,7 +33,7 @@ fn the_first_stroke_leaves_out_without_another_click() {
     assert!(savable(&window));
     // Once more at the same place nothing changes, and that is said.
     bench::drag(&mut window, CLOTH);
-    window.get_by_label_contains("it is left out already");
+    window.get_by_label_contains("this is left out already");
     window.get_by_label("Keep").click();
     window.run();
     assert!(window.query_by_label_contains("already").is_none());

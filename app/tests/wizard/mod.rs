@@ -114,8 +114,8 @@ fn the_wizard_goes_to_a_finished_calibration() {
     assert!(window.rig().join("calibration/color.toml").exists());
     assert!(!window.rig().join("calibration/lights.toml").exists());
     window.until_label("1 of 6 sheets");
-    assert!(window.harness.query_by_label_contains("Finished now, the lights").is_some());
-    assert!(window.harness.query_by_label_contains("This sheet should bring that to").is_some());
+    assert!(window.harness.query_by_label_contains("Light positions with these sheets").is_some());
+    assert!(window.harness.query_by_label_contains("This sheet should improve that to").is_some());
     looks(&mut window, "calibrate-sheet", &mut results);
     let table = std::fs::read_to_string(window.rig().join("scene.toml")).unwrap();
     assert!(!table.contains("[table]"), "the swatch lies there again: {table}");
