@@ -320,7 +320,8 @@ fn the_window_solves_as_the_command_line_does() {
     let rig = window.rig();
     // As `weavelight solve --settings FILE` makes them.
     window.harness.state().shared().settings.save().unwrap();
-    let settings = weavelight::solve::Settings::read(&window.home().join("settings.toml")).unwrap();
+    let settings =
+        weavelight::settings::Settings::read(&window.home().join("settings.toml")).unwrap();
     let options = settings.options(
         &rig.join("scans/linen 1"),
         &rig.join("calibration"),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-pub use weavelight::solve::{DeviceName, MethodName, NormalYName, Settings as SolveSettings};
+pub use weavelight::settings::{DeviceName, MethodName, NormalYName, Settings as SolveSettings};
 
 /// What is remembered.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

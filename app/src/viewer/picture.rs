@@ -2,7 +2,7 @@
 
 use eframe::egui::{Color32, ColorImage};
 use weavelight::instrument::Calibration;
-use weavelight::raw;
+use weavelight::linear::preview;
 use weavelight::raw::Frame;
 use weavelight_calibration::description::Image;
 

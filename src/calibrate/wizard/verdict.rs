@@ -3,10 +3,13 @@
 use super::rig_folder::RigFolder;
 use super::task::Pose;
 use crate::calibrate::CheckReport;
-use crate::files::{FileError, SCHEMA, read_input_text, sha256_of_file, write_atomic};
+use crate::files::{FileError, read_input_text, sha256_of_file, write_atomic};
 use crate::instrument::LIGHTS_FILE;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+
+/// The schema of the file that keeps a verdict.
+const SCHEMA: i64 = 1;
 
 /// Result of the check with a sheet that was not used for the fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

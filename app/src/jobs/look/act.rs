@@ -68,7 +68,7 @@ fn open(path: &Path, tools: &mut Tools, out: &Outbox) {
 }
 
 fn solve_scan(scan: &Path, settings: SolveSettings, tools: &mut Tools, out: &Outbox) {
-    let how = (settings, weavelight::solve::Reuse::IfCurrent);
+    let how = (settings, weavelight::solution::Reuse::IfCurrent);
     if let Some(solved) = crate::jobs::scan::solve::solve(scan, how, tools, out) {
         open_solution(&solved.solution, tools, out);
     }

@@ -69,7 +69,7 @@ pub(crate) fn capture_of(
     if report.scale != 1 {
         return Err(texts::reduced(report.scale));
     }
-    let method = method_of(report).ok_or_else(|| texts::unknown_method(&report.method))?;
+    let method = report.solved_by().ok_or_else(|| texts::unknown_method(&report.method))?;
     let session = find_session(folder, project, report)?;
     let calibration = find_calibration(folder, project, report)
         .ok_or_else(|| texts::NO_CALIBRATION.to_owned())?;

@@ -13,7 +13,7 @@ use crate::viewer::pyramid::Pyramid;
 use crate::viewer::slopes::Distribution;
 use std::path::PathBuf;
 use std::sync::Arc;
-use weavelight::solve::Photosite;
+use weavelight::photometry::Photosite;
 use weavelight_calibration::description::Image;
 
 /// Requests of the Look room.

@@ -22,7 +22,7 @@ use weavelight::device::scan::{
 use weavelight::raw::Hint;
 use weavelight::session::Session;
 use weavelight::simulate::Scene;
-use weavelight::solve::Reuse;
+use weavelight::solution::Reuse;
 use weavelight_sim::cloth::Preset;
 
 /// How a scan ended that did not fail.

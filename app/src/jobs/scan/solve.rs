@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use weavelight::report::{expected_error, page_of_solve};
 use weavelight::solution::Report;
-use weavelight::solve::{Reuse, Shown, Solved, run_with_page};
+use weavelight::solution::Reuse;
+use weavelight::solve::{Shown, Solved, run};
 
 /// A solution of a scan.
 pub struct SolvedScan {
@@ -48,7 +49,7 @@ pub fn solve(
             page_of_solve(shown, None)
         };
         let send = |state: weavelight::solve::Progress| out.tick(state.share(), state.stage.what());
-        Ok(run_with_page(&options, &send, Some(&page))?)
+        Ok(run(&options, &send, Some(&page))?)
     });
     let Solved { report, up_to_date } = solved.ok()?;
     let (report, expected_deg) = (Box::new(report), expected.into_inner().flatten());

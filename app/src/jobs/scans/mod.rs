@@ -9,7 +9,7 @@ use crate::model::scan_entry::ScanEntry;
 use crate::model::settings::SolveSettings;
 use eframe::egui::ColorImage;
 use std::path::PathBuf;
-use weavelight::solve::Reuse;
+use weavelight::solution::Reuse;
 
 /// A scan that is in the bin, with its solution.
 #[derive(Clone, Debug, PartialEq)]

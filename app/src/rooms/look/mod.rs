@@ -43,7 +43,7 @@ use eframe::egui;
 use eframe::egui::RichText;
 use std::path::PathBuf;
 use std::sync::Arc;
-use weavelight::solve::Photosite;
+use weavelight::photometry::Photosite;
 
 /// What the mouse does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
