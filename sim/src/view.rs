@@ -3,13 +3,15 @@
 use nalgebra::{Point3, Vector3};
 use weavelight_calibration::description::{Camera, Plane};
 
-/// A camera with its vignetting.
+/// A camera with what its lens does to the light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Pinhole, distortion, pose.
     pub camera: Camera,
     /// Share of light lost at the corner farthest from the principal point; grows with the square of the distance.
     pub vignetting: f64,
+    /// Gaussian blur of lens and optical low-pass filter together: its standard deviation, photosites. 0: none.
+    pub psf_px: f64,
 }
 
 /// A ray in the rig frame: millimetres, unit direction away from the camera.
@@ -116,7 +118,7 @@ mod tests {
     use crate::rig::reference_camera;
 
     fn view() -> View {
-        View { camera: reference_camera(4928, 3264, 1), vignetting: 0.2 }
+        View { camera: reference_camera(4928, 3264, 1), vignetting: 0.2, psf_px: 0.0 }
     }
 
     #[test]

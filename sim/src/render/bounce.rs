@@ -8,18 +8,18 @@ use std::f32::consts::TAU;
 const DIRECTIONS: u64 = 8;
 
 /// Adds the light that neighbouring yarns throw onto a photosite's samples: diffuse, one bounce, by cosine-weighted
-/// directions. `add(light, signal)` is called once a light.
+/// directions, in some channels. `add(light, signals)` is called once a light.
 ///
 /// With directions drawn in proportion to the cosine, the irradiance is the mean of the radiosities seen.
-pub(super) fn gather(
+pub(super) fn gather<const N: usize>(
     fabric: &Fabric,
     grid: &HeightGrid,
-    channel: &[f32; 3],
+    (rows, channels): (&[[f32; 3]; 3], [usize; N]),
     hits: &[Hit],
     beams: &[Beam],
-    mut add: impl FnMut(usize, f32),
+    mut add: impl FnMut(usize, [f32; N]),
 ) {
-    let mut sums = vec![0.0f32; beams.len()];
+    let mut sums = vec![[0.0f32; N]; beams.len()];
     for hit in hits {
         let key = Key::new(hit.x_mm.to_bits()).with(hit.y_mm.to_bits());
         for k in 0..DIRECTIONS {
@@ -32,18 +32,18 @@ pub(super) fn gather(
             if dot(normal, towards) >= 0.0 {
                 continue; // the grid's chord was met from behind
             }
-            let passed_on = hit.albedo * dot(*channel, surface.albedo);
+            let passed_on = channels.map(|c| hit.albedo[c] * dot(rows[c], surface.albedo));
             for (sum, beam) in sums.iter_mut().zip(beams) {
                 let facing = dot(normal, beam.towards);
                 if facing > 0.0 && grid.is_open(x, y, surface.height_mm as f32, beam.towards) {
-                    *sum += passed_on * facing;
+                    (0..N).for_each(|k| sum[k] += passed_on[k] * facing);
                 }
             }
         }
     }
     let share = 1.0 / (hits.len() as f32 * DIRECTIONS as f32);
     for (i, (sum, beam)) in sums.iter().zip(beams).enumerate() {
-        add(i, sum * share * beam.strength);
+        add(i, sum.map(|sum| sum * share * beam.strength));
     }
 }
 

@@ -1,3 +1,4 @@
+use super::blur::{Kernel, expose_blurred};
 use super::bounce::gather;
 use super::relief::HeightGrid;
 use super::{Signals, Stage, Subject, Tile};
@@ -56,8 +57,10 @@ pub(super) struct Hit {
     pub(super) y_mm: f64,
     pub(super) height_mm: f32,
     pub(super) normal: [f32; 3],
-    /// In the photosite's own channel.
-    pub(super) albedo: f32,
+    /// Linear sRGB.
+    pub(super) reflectance: [f32; 3],
+    /// The same in camera RGB.
+    pub(super) albedo: [f32; 3],
     /// Cloth may shine; the table is matt.
     pub(super) is_cloth: bool,
 }
@@ -72,7 +75,11 @@ pub(super) struct Beam {
 
 impl Subject for Fabric {
     fn expose(&self, stage: &Stage, tile: Tile, signals: &mut Signals) {
-        let scene = TileScene::new(self, stage, tile);
+        let kernel = Kernel::new(stage.view.psf_px, self.samples_per_side(stage.view.mm_per_px()));
+        let scene = TileScene::new(self, stage, tile, kernel.margin());
+        if kernel.margin() > 0 {
+            return expose_blurred(&scene, &kernel, tile, signals);
+        }
         let (mut hits, mut beams) = (Vec::new(), Vec::new());
         for at in 0..tile.pixels() {
             scene.expose(
@@ -135,18 +142,29 @@ impl Fabric {
 }
 
 /// All that the photosites of a tile share.
-struct TileScene<'a> {
-    fabric: &'a Fabric,
-    stage: &'a Stage,
+pub(super) struct TileScene<'a> {
+    pub(super) fabric: &'a Fabric,
+    pub(super) stage: &'a Stage,
     plane: Plane,
     center: Point3<f64>,
-    grid: Option<HeightGrid>,
-    samples: usize,
-    channels: [[f32; 3]; 3],
+    pub(super) grid: Option<HeightGrid>,
+    pub(super) samples: usize,
+    pub(super) channels: [[f32; 3]; 3],
+}
+
+/// The surface that a photosite sees.
+pub(super) struct Seen {
+    /// Its middle, rig frame.
+    pub(super) middle: Point3<f64>,
+    /// Sums over the samples.
+    normal: [f32; 3],
+    albedo: [f32; 3],
+    height_mm: f64,
 }
 
 impl<'a> TileScene<'a> {
-    fn new(fabric: &'a Fabric, stage: &'a Stage, tile: Tile) -> Self {
+    /// The scene of a tile and of `margin` photosites around it.
+    fn new(fabric: &'a Fabric, stage: &'a Stage, tile: Tile, margin: usize) -> Self {
         let plane = Plane {
             point_mm: Point3::new(0.0, 0.0, fabric.thickness_mm),
             normal: Vector3::z_axis(),
@@ -156,7 +174,7 @@ impl<'a> TileScene<'a> {
             fabric,
             stage,
             center: stage.view.center(),
-            grid: fabric.occludes().then(|| tabulate(fabric, stage, tile)),
+            grid: fabric.occludes().then(|| tabulate(fabric, stage, tile, margin)),
             plane,
             samples: fabric.samples_per_side(mm_per_px),
             channels: channel_rows(),
@@ -174,62 +192,73 @@ impl<'a> TileScene<'a> {
         out: &mut Signals,
     ) {
         let channel = self.stage.cfa.channel(x, y) as usize;
-        let Some(middle) = self.find_hits(x, y, at, channel, hits, out) else { return };
+        let Some(seen) = self.find_hits([x as f64, y as f64], hits) else { return };
+        let middle = seen.middle;
+        if let Some(truth) = &mut out.truth {
+            let norm = dot(seen.normal, seen.normal).sqrt().max(1e-12);
+            truth.normal[at] = seen.normal.map(|c| c / norm);
+            truth.albedo[at] = seen.albedo.map(|c| c / hits.len() as f32);
+            truth.height_mm[at] = seen.height_mm as f32;
+        }
         let transmission = self.stage.view.transmission(x as f64, y as f64);
         self.find_beams(&middle, channel, transmission, beams);
-        let view = (self.center - middle).normalize();
-        let view = [view.x as f32, view.y as f32, view.z as f32];
+        let view = self.towards_camera(&middle);
         let share = 1.0 / hits.len() as f32;
         for (beam, light) in beams.iter().zip(&mut out.lights) {
             let sum: f32 = hits.iter().map(|hit| self.direct(hit, beam, view, channel)).sum();
             light[at] = beam.strength * share * sum;
         }
         if let (Bounce::Once, Some(grid)) = (self.fabric.bounce, &self.grid) {
-            gather(self.fabric, grid, &self.channels[channel], hits, beams, |i, more| {
-                out.lights[i][at] += more;
-            });
+            let channels = (&self.channels, [channel]);
+            gather(self.fabric, grid, channels, hits, beams, |i, [more]| out.lights[i][at] += more);
         }
-        let sky: f32 = hits.iter().map(|hit| hit.albedo * (0.5 + 0.5 * hit.normal[2])).sum();
+        let sky: f32 = hits.iter().map(|hit| hit.albedo[channel] * sky_over(hit)).sum();
         out.ambient[at] = (self.stage.ambient[channel] * transmission) as f32 * share * sky;
+    }
+
+    /// Unit vector to the camera.
+    pub(super) fn towards_camera(&self, place: &Point3<f64>) -> [f32; 3] {
+        let view = (self.center - place).normalize();
+        [view.x as f32, view.y as f32, view.z as f32]
     }
 
     #[inline]
     fn direct(&self, hit: &Hit, beam: &Beam, view: [f32; 3], channel: usize) -> f32 {
+        let facing = self.facing(hit, beam);
+        if facing <= 0.0 { 0.0 } else { facing * self.reflected(hit, beam, view, channel) }
+    }
+
+    /// Cosine between surface and light; 0 where the light does not reach it.
+    #[inline]
+    pub(super) fn facing(&self, hit: &Hit, beam: &Beam) -> f32 {
         let facing = dot(hit.normal, beam.towards);
         if facing <= 0.0 {
             return 0.0;
         }
-        if let Some(grid) = &self.grid
-            && !grid.is_open(hit.x_mm, hit.y_mm, hit.height_mm, beam.towards)
-        {
-            return 0.0;
+        match &self.grid {
+            Some(grid) if !grid.is_open(hit.x_mm, hit.y_mm, hit.height_mm, beam.towards) => 0.0,
+            _ => facing,
         }
-        if !hit.is_cloth {
-            return facing * hit.albedo;
-        }
-        let directions = Directions { normal: hit.normal, light: beam.towards, view };
-        facing * (hit.albedo + self.fabric.cloth.reflectance.gloss(&directions, channel))
     }
 
-    /// Samples the photosite's footprint and notes the truth; gives the middle of what it sees, rig frame.
-    fn find_hits(
-        &self,
-        x: usize,
-        y: usize,
-        at: usize,
-        channel: usize,
-        hits: &mut Vec<Hit>,
-        out: &mut Signals,
-    ) -> Option<Point3<f64>> {
+    /// Share of the light that goes towards the camera, times pi.
+    #[inline]
+    pub(super) fn reflected(&self, hit: &Hit, beam: &Beam, view: [f32; 3], channel: usize) -> f32 {
+        if !hit.is_cloth {
+            return hit.albedo[channel];
+        }
+        let directions = Directions { normal: hit.normal, light: beam.towards, view };
+        hit.albedo[channel] + self.fabric.cloth.reflectance.gloss(&directions, channel)
+    }
+
+    /// Samples a photosite's footprint.
+    pub(super) fn find_hits(&self, [x, y]: [f64; 2], hits: &mut Vec<Hit>) -> Option<Seen> {
         hits.clear();
         let per_side = self.samples;
         let (mut normal, mut albedo, mut middle) = ([0.0f32; 3], [0.0f32; 3], Vector3::zeros());
         for k in 0..per_side * per_side {
             let offset = |i: usize| (i as f64 + 0.5) / per_side as f64 - 0.5;
-            let ray = self
-                .stage
-                .view
-                .ray(x as f64 + offset(k % per_side), y as f64 + offset(k / per_side));
+            let ray = self.stage.view.ray(x + offset(k % per_side), y + offset(k / per_side));
             let [px, py] = self.meet(&ray)?;
             let surface = self.fabric.surface(px, py);
             let n = unit_normal(surface.slope);
@@ -243,18 +272,18 @@ impl<'a> TileScene<'a> {
                 y_mm: py,
                 height_mm: surface.height_mm as f32,
                 normal: n,
-                albedo: dot(self.channels[channel], surface.albedo),
+                reflectance: surface.albedo,
+                albedo: self.channels.map(|row| dot(row, surface.albedo)),
                 is_cloth: self.fabric.covers(px, py),
             });
         }
         middle /= hits.len() as f64;
-        if let Some(truth) = &mut out.truth {
-            let norm = dot(normal, normal).sqrt().max(1e-12);
-            truth.normal[at] = normal.map(|c| c / norm);
-            truth.albedo[at] = albedo.map(|c| c / hits.len() as f32);
-            truth.height_mm[at] = middle.z as f32;
-        }
-        Some(Point3::new(middle.x, middle.y, middle.z + self.fabric.thickness_mm))
+        Some(Seen {
+            middle: Point3::new(middle.x, middle.y, middle.z + self.fabric.thickness_mm),
+            normal,
+            albedo,
+            height_mm: middle.z,
+        })
     }
 
     /// Where a ray of sight meets the cloth.
@@ -278,7 +307,7 @@ impl<'a> TileScene<'a> {
         Some(at)
     }
 
-    fn find_beams(
+    pub(super) fn find_beams(
         &self,
         middle: &Point3<f64>,
         channel: usize,
@@ -296,6 +325,12 @@ impl<'a> TileScene<'a> {
     }
 }
 
+/// Share of an even sky that a surface sees.
+#[inline]
+pub(super) fn sky_over(hit: &Hit) -> f32 {
+    0.5 + 0.5 * hit.normal[2]
+}
+
 #[inline]
 pub(super) fn unit_normal([sx, sy]: [f64; 2]) -> [f32; 3] {
     let scale = 1.0 / (sx * sx + sy * sy + 1.0).sqrt();
@@ -303,10 +338,10 @@ pub(super) fn unit_normal([sx, sy]: [f64; 2]) -> [f32; 3] {
 }
 
 /// The relief under a tile and around it, as far as shadows and sight reach.
-fn tabulate(fabric: &Fabric, stage: &Stage, tile: Tile) -> HeightGrid {
+fn tabulate(fabric: &Fabric, stage: &Stage, tile: Tile, around: usize) -> HeightGrid {
     let [low, high] = fabric.range_mm();
     let (mut least, mut most) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for (u, v) in border(tile) {
+    for (u, v) in border(tile, around as f64) {
         let ray = stage.view.ray(u, v);
         for height in [low, high] {
             let plane = Plane {
@@ -334,18 +369,19 @@ fn tabulate(fabric: &Fabric, stage: &Stage, tile: Tile) -> HeightGrid {
     HeightGrid::tabulate(origin, most.map(|c| c + margin), step, |x, y| fabric.height_mm(x, y))
 }
 
-/// Points around a tile at which its outline is followed; the half pixels around it are within the grid's margin.
-fn border(tile: Tile) -> Vec<(f64, f64)> {
+/// Points `around` photosites beyond a tile at which its outline is followed; the half pixels around it are within the
+/// grid's margin.
+fn border(tile: Tile, around: f64) -> Vec<(f64, f64)> {
     const POINTS: usize = 4;
     let along = |from: usize, length: usize, k: usize| {
-        from as f64 + (length as f64 - 1.0) * k as f64 / POINTS as f64
+        from as f64 - around + (length as f64 - 1.0 + 2.0 * around) * k as f64 / POINTS as f64
     };
     (0..=POINTS)
         .flat_map(|k| {
             let (u, v) = (along(tile.x, tile.width, k), along(tile.y, tile.height, k));
-            let (right, bottom) =
-                (along(tile.x, tile.width, POINTS), along(tile.y, tile.height, POINTS));
-            [(u, tile.y as f64), (u, bottom), (tile.x as f64, v), (right, v)]
+            let [left, right] = [0, POINTS].map(|k| along(tile.x, tile.width, k));
+            let [top, bottom] = [0, POINTS].map(|k| along(tile.y, tile.height, k));
+            [(u, top), (u, bottom), (left, v), (right, v)]
         })
         .collect()
 }

@@ -1,10 +1,12 @@
 //! From a subject to raw numbers: tiles of the frame, all lights at once, rows of tiles over threads.
 
+mod blur;
 mod bounce;
 mod fabric;
 mod relief;
 mod shoot;
 
+pub(crate) use blur::Kernel;
 pub(crate) use fabric::TABLE_ALBEDO;
 pub use fabric::{Bounce, Extent, Fabric};
 pub use shoot::{Frames, Shot, Truth, auto_exposure, shoot, shoot_with_truth};

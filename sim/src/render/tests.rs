@@ -1,6 +1,6 @@
 use super::*;
 use crate::cloth::{Cloth, Facets, Preset, Relief, Structure, Wrinkles};
-use crate::reflectance::Reflectance;
+use crate::reflectance::{Reflectance, dot};
 use crate::rig::{REFERENCE_LIGHTS_MM, leds_at, reference_camera};
 use crate::sensor::Sensor;
 use nalgebra::{Point3, Vector3};
@@ -10,7 +10,7 @@ fn stage(width: usize, height: usize) -> Stage {
     let positions: Vec<Point3<f64>> =
         REFERENCE_LIGHTS_MM.iter().map(|&p| Point3::from(p)).collect();
     Stage {
-        view: View { camera: reference_camera(width, height, 1), vignetting: 0.1 },
+        view: View { camera: reference_camera(width, height, 1), vignetting: 0.1, psf_px: 0.0 },
         lights: leds_at(&positions, 1).into_iter().map(Light::Point).collect(),
         ambient: [0.004, 0.005, 0.003],
         cfa: Cfa::RGGB,
@@ -242,4 +242,78 @@ fn the_table_does_not_shine_with_the_cloth() {
         assert_eq!(dull[corner], shiny[corner], "light {light}");
         assert!(dull[middle] < shiny[middle], "light {light}");
     }
+}
+
+/// Signals and truth of a part of the frame through a lens that blurs.
+fn blurred(cloth: Cloth, psf_px: f64, tile: Tile) -> Signals {
+    let mut stage = stage(240, 160);
+    stage.view.psf_px = psf_px;
+    let blank = vec![0.0; tile.pixels()];
+    let truth = Some(Truth::sized(tile.pixels()));
+    let mut out = Signals { lights: vec![blank.clone(); 10], ambient: blank, truth };
+    fabric(cloth).expose(&stage, tile, &mut out);
+    out
+}
+
+#[test]
+fn blur_leaves_what_is_even() {
+    let tile = Tile { x: 0, y: 64, width: 48, height: 40 };
+    let (sharp, soft) = (blurred(flat(), 0.0, tile), blurred(flat(), 0.7, tile));
+    let all = |signals: &Signals| [signals.lights.concat(), signals.ambient.clone()].concat();
+    for (sharp, soft) in all(&sharp).iter().zip(all(&soft)) {
+        assert!((soft / sharp - 1.0).abs() < 1e-4, "{soft}, not {sharp}");
+    }
+    let (sharp, soft) = (sharp.truth.unwrap(), soft.truth.unwrap());
+    for (sharp, soft) in sharp.albedo.iter().zip(&soft.albedo) {
+        assert!((0..3).all(|c| (sharp[c] - soft[c]).abs() < 1e-5));
+    }
+}
+
+/// Tiles do not show, and the coarser the blur, the less is left of the yarns.
+#[test]
+fn blur_knows_no_tiles_and_flattens_yarns() {
+    let cloth = || Preset::Linen.cloth(3);
+    let tile = Tile { x: 70, y: 50, width: 24, height: 20 };
+    let whole = blurred(cloth(), 0.7, tile);
+    for (x, y) in [(70, 50), (82, 50), (70, 60), (82, 60)] {
+        let part = blurred(cloth(), 0.7, Tile { x, y, width: 12, height: 10 });
+        for at in 0..120 {
+            let place = (y - 50 + at / 12) * 24 + x - 70 + at % 12;
+            let (part, whole) = (part.lights[4][at], whole.lights[4][place]);
+            // Shadows may end on either side of a node of the height grid.
+            assert!((part - whole).abs() < 0.03 * whole.max(0.02), "{part}, not {whole}");
+        }
+    }
+    let spread = |signals: &Signals| {
+        let values = &signals.truth.as_ref().unwrap().height_mm;
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        values.iter().map(|z| (z - mean).powi(2)).sum::<f32>().sqrt()
+    };
+    let [none, some, much] = [0.0, 0.7, 2.0].map(|psf| spread(&blurred(cloth(), psf, tile)));
+    assert!(much < 0.5 * some && some < 0.8 * none, "{none}, {some}, {much}");
+    let normals = &whole.truth.unwrap().normal;
+    assert!(normals.iter().all(|n| (dot(*n, *n) - 1.0).abs() < 1e-5));
+}
+
+#[test]
+fn a_board_blurs_at_its_edges_only() {
+    use crate::target::{Art, BoardShape, Panel};
+    let board = || Panel {
+        rig_from_panel: nalgebra::IsometryMatrix3::identity(),
+        art: Art::Board(BoardShape { columns: 7, rows: 5, square_mm: 20.0 }),
+    };
+    let expose = |psf_px| {
+        let mut stage = stage(240, 160);
+        stage.view.psf_px = psf_px;
+        let tile = Tile { x: 0, y: 0, width: 240, height: 160 };
+        let blank = vec![0.0; tile.pixels()];
+        let mut out = Signals { lights: vec![blank.clone(); 10], ambient: blank, truth: None };
+        board().expose(&stage, tile, &mut out);
+        out.lights[0].clone()
+    };
+    let (sharp, soft) = (expose(0.0), expose(0.7));
+    let differ = sharp.iter().zip(&soft).filter(|(a, b)| (*a / *b - 1.0).abs() > 1e-3).count();
+    assert!(differ > 0 && differ < sharp.len() / 4, "{differ} of {}", sharp.len());
+    let (a, b): (f32, f32) = (sharp.iter().sum(), soft.iter().sum());
+    assert!((a / b - 1.0).abs() < 2e-3, "{a}, {b}");
 }

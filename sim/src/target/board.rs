@@ -159,7 +159,8 @@ mod tests {
     fn every_board_is_whole_and_the_picture_is_covered() {
         let board = BoardShape { columns: 9, rows: 6, square_mm: 25.0 };
         for seed in 0..5 {
-            let view = View { camera: reference_camera(1232, 816, seed), vignetting: 0.0 };
+            let view =
+                View { camera: reference_camera(1232, 816, seed), vignetting: 0.0, psf_px: 0.0 };
             let poses = board_poses(&board, &view, 0.0, 14, seed);
             let mut seen = [[false; 6]; 4];
             for (k, pose) in poses.iter().enumerate() {

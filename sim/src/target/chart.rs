@@ -134,7 +134,11 @@ mod tests {
     #[test]
     fn stated_rectangles_lie_within_their_patches() {
         for size in [[1232, 816], [308, 204]] {
-            let view = View { camera: reference_camera(size[0], size[1], 3), vignetting: 0.0 };
+            let view = View {
+                camera: reference_camera(size[0], size[1], 3),
+                vignetting: 0.0,
+                psf_px: 0.0,
+            };
             let chart = Chart::filling(&view);
             for (k, patch) in chart.patches(&view, 0.0).iter().enumerate() {
                 let [u0, v0, u1, v1] = patch.rect_px;

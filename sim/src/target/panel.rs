@@ -2,7 +2,7 @@ use super::{BoardShape, Chart, Sheet};
 use crate::color::channel_rows;
 use crate::lamp::arrival;
 use crate::reflectance::dot;
-use crate::render::{Signals, Stage, Subject, TABLE_ALBEDO, Tile};
+use crate::render::{Kernel, Signals, Stage, Subject, TABLE_ALBEDO, Tile};
 use nalgebra::{IsometryMatrix3, Point3, Vector3};
 use weavelight_calibration::description::Plane;
 
@@ -54,30 +54,64 @@ type Corner = Option<[f64; 2]>;
 impl Subject for Panel {
     fn expose(&self, stage: &Stage, tile: Tile, signals: &mut Signals) {
         let plane = self.plane();
-        let corners = self.corners(stage, &plane, tile);
+        let kernel = Kernel::new(stage.view.psf_px, 1);
+        let margin = kernel.margin();
+        let corners = self.corners(stage, &plane, tile, margin);
+        let (wide, high) = (tile.width + 2 * margin, tile.height + 2 * margin);
+        let quad = |column: usize, row: usize| {
+            let line = row * (wide + 1) + column;
+            let below = line + wide + 1;
+            [corners[line], corners[line + 1], corners[below], corners[below + 1]]
+        };
+        let inks: Vec<Ink> =
+            (0..wide * high).map(|k| self.mean_ink(&quad(k % wide, k / wide))).collect();
         let channels = channel_rows();
-        for row in 0..tile.height {
-            for column in 0..tile.width {
-                let line = row * (tile.width + 1) + column;
-                let below = line + tile.width + 1;
-                let quad = [corners[line], corners[line + 1], corners[below], corners[below + 1]];
-                let (x, y) = (tile.x + column, tile.y + row);
-                let row_of_channel = channels[stage.cfa.channel(x, y) as usize];
-                let at = row * tile.width + column;
-                match place(&quad) {
-                    Some(middle) => self.light_up(
-                        stage,
-                        (x, y),
-                        middle,
-                        self.mean_ink(&quad, row_of_channel),
-                        at,
-                        signals,
-                    ),
-                    None => light_table(stage, (x, y), at, signals),
+        for at in 0..tile.pixels() {
+            let (column, row) = (at % tile.width, at / tile.width);
+            let (x, y) = (tile.x + column, tile.y + row);
+            let ink = blurred(&inks, wide, [column, row], &kernel);
+            match place(&quad(column + margin, row + margin)) {
+                Some(middle) => {
+                    let ink = ink.in_channel(channels[stage.cfa.channel(x, y) as usize]);
+                    self.light_up(stage, (x, y), middle, ink, at, signals);
                 }
+                None => light_table(stage, (x, y), at, signals),
             }
         }
     }
+}
+
+/// Reflectance of a pixel's footprint, linear sRGB: a sum over samples.
+#[derive(Clone, Copy)]
+struct Ink {
+    sum: [f32; 3],
+    samples: f32,
+}
+
+impl Ink {
+    fn even(ink: [f32; 3]) -> Self {
+        Self { sum: ink, samples: 1.0 }
+    }
+
+    fn in_channel(&self, channel: [f32; 3]) -> f32 {
+        dot(channel, self.sum) / self.samples
+    }
+}
+
+/// The ink of a pixel of the tile as lens and filter blur it.
+fn blurred(inks: &[Ink], wide: usize, [column, row]: [usize; 2], kernel: &Kernel) -> Ink {
+    let mut sum = [0.0f32; 3];
+    for (j, down) in kernel.weights().iter().enumerate() {
+        for (i, across) in kernel.weights().iter().enumerate() {
+            let ink = &inks[(row + j) * wide + column + i];
+            if kernel.margin() == 0 {
+                return *ink;
+            }
+            let weight = down * across / ink.samples;
+            (0..3).for_each(|c| sum[c] += weight * ink.sum[c]);
+        }
+    }
+    Ink::even(sum)
 }
 
 impl Panel {
@@ -90,13 +124,15 @@ impl Panel {
         }
     }
 
-    /// Where the corners of a tile's pixels lie on the panel, (width + 1) x (height + 1).
-    fn corners(&self, stage: &Stage, plane: &Plane, tile: Tile) -> Vec<Corner> {
+    /// Where the corners of the pixels of a tile and of `margin` pixels around it lie on the panel, row by row.
+    fn corners(&self, stage: &Stage, plane: &Plane, tile: Tile, margin: usize) -> Vec<Corner> {
         let panel_from_rig = self.rig_from_panel.inverse();
-        let mut corners = Vec::with_capacity((tile.width + 1) * (tile.height + 1));
-        for row in 0..=tile.height {
-            corners.extend((0..=tile.width).map(|column| {
-                let (u, v) = ((tile.x + column) as f64 - 0.5, (tile.y + row) as f64 - 0.5);
+        let (width, height) = (tile.width + 2 * margin, tile.height + 2 * margin);
+        let mut corners = Vec::with_capacity((width + 1) * (height + 1));
+        let first = margin as f64 + 0.5;
+        for row in 0..=height {
+            corners.extend((0..=width).map(|column| {
+                let (u, v) = ((tile.x + column) as f64 - first, (tile.y + row) as f64 - first);
                 let point = stage.view.ray(u, v).meet(plane)?;
                 let p = panel_from_rig.transform_point(&point);
                 Some([p.x, p.y])
@@ -105,13 +141,15 @@ impl Panel {
         corners
     }
 
-    /// Mean reflectance of a pixel's footprint in one channel.
-    fn mean_ink(&self, quad: &[Corner; 4], channel: [f32; 3]) -> f32 {
+    /// Mean reflectance of a pixel's footprint.
+    fn mean_ink(&self, quad: &[Corner; 4]) -> Ink {
         let ink = |p: [f64; 2]| self.art.ink(p[0], p[1]).unwrap_or([TABLE_ALBEDO; 3]);
-        let [Some(a), Some(b), Some(c), Some(d)] = *quad else { return TABLE_ALBEDO };
+        let [Some(a), Some(b), Some(c), Some(d)] = *quad else {
+            return Ink::even([TABLE_ALBEDO; 3]);
+        };
         let first = ink(a);
         if [b, c, d, between(a, b, c, d, 0.5, 0.5)].into_iter().all(|p| ink(p) == first) {
-            return dot(channel, first);
+            return Ink::even(first);
         }
         let offset = |i: usize| (i as f64 + 0.5) / EDGE_SAMPLES as f64;
         let mut sum = [0.0f32; 3];
@@ -120,7 +158,7 @@ impl Panel {
                 ink(between(a, b, c, d, offset(k % EDGE_SAMPLES), offset(k / EDGE_SAMPLES)));
             (0..3).for_each(|c| sum[c] += sample[c]);
         }
-        dot(channel, sum) / (EDGE_SAMPLES * EDGE_SAMPLES) as f32
+        Ink { sum, samples: (EDGE_SAMPLES * EDGE_SAMPLES) as f32 }
     }
 
     fn light_up(

@@ -157,7 +157,8 @@ mod tests {
     #[test]
     fn the_strip_is_whole_in_every_pose() {
         for seed in 0..4 {
-            let view = View { camera: reference_camera(1232, 816, seed), vignetting: 0.0 };
+            let view =
+                View { camera: reference_camera(1232, 816, seed), vignetting: 0.0, psf_px: 0.0 };
             let poses: Vec<_> =
                 sheet_frames(4, 20.0, 100.0).into_iter().map(|(_, pose)| pose).collect();
             let (board, middle) = strip_for(&view, &poses).unwrap();
