@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use std::path::Path;
 use weavelight::compare::read_map;
 use weavelight::raster::read_exr;
-use weavelight::simulate::{self, Material, Part};
+use weavelight::simulate::{self, Flaws, Material, Part};
 use weavelight::solution::Residuals;
 use weavelight::solution::{Report, residual_exr};
 use weavelight::solve::{self, Scene};
@@ -35,6 +35,7 @@ fn samples(folder: &Path, preset: Preset) -> Vec<Vec<Sample>> {
         size_px: Some(SIZE_PX),
         only: vec![Part::Swatch],
         material: Material { preset, structure, ..Material::default() },
+        flaws: Flaws { psf_px: 0.0, ..Flaws::default() },
         ..simulate::Options::default()
     };
     simulate::run(&options, &|_, _| {}).unwrap();

@@ -54,6 +54,15 @@ struct FabricArgs {
     /// Half the width of a yarn
     #[arg(long, value_name = "MM")]
     yarn_radius_mm: Option<f64>,
+    /// Reflectance of the warp's crowns (a knit's yarn), linear sRGB, 0 to 1 [default: the fabric's own]
+    #[arg(long, value_name = "R,G,B", value_parser = triple)]
+    warp_color: Option<[f64; 3]>,
+    /// Reflectance of the weft's crowns [default: the fabric's own]
+    #[arg(long, value_name = "R,G,B", value_parser = triple)]
+    weft_color: Option<[f64; 3]>,
+    /// By which share yarns are darker between their crowns than on them [default: the fabric's own; linen 0.08]
+    #[arg(long, value_name = "SHARE")]
+    wear: Option<f64>,
     /// Print colours on it
     #[arg(long)]
     print: bool,
@@ -119,6 +128,9 @@ struct FlawArgs {
     /// Share of the light lost in the farthest corner
     #[arg(long, value_name = "SHARE", default_value_t = Flaws::default().vignetting)]
     vignetting: f64,
+    /// Blur of lens and low-pass filter, Gaussian sigma in photosites; 0 for none
+    #[arg(long, value_name = "S", default_value_t = Flaws::default().psf_px)]
+    psf_px: f64,
     /// Ambient light; 1 is a dim room
     #[arg(long, value_name = "X", default_value_t = Flaws::default().ambient)]
     ambient: f64,
@@ -167,6 +179,15 @@ fn extent(text: &str) -> Result<[f64; 2], String> {
     pair(text).ok_or_else(|| "give width x height in millimetres, as in 200x150".to_owned())
 }
 
+/// "0.5,0.4,0.3"
+pub(super) fn triple(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    numbers
+        .ok()
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "give three numbers with commas between, as in 0.5,0.4,0.3".to_owned())
+}
+
 fn pair<T: std::str::FromStr>(text: &str) -> Option<[T; 2]> {
     let (width, height) = text.split_once(['x', 'X'])?;
     Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
@@ -194,6 +215,9 @@ impl FabricArgs {
             structure: self.structure.as_deref().and_then(Structure::parse),
             threads_per_cm: self.threads_per_cm,
             yarn_radius_mm: self.yarn_radius_mm,
+            warp_color: self.warp_color,
+            weft_color: self.weft_color,
+            wear: self.wear,
             print: self.print,
             wrinkles_mm: self.wrinkles_mm,
             thickness_mm: self.thickness_mm,
@@ -227,6 +251,7 @@ impl FlawArgs {
         Flaws {
             ruler_error_mm: self.ruler_error_mm,
             vignetting: self.vignetting,
+            psf_px: self.psf_px,
             ambient: self.ambient,
             drift: self.drift,
             swapped: self.swapped.as_ref().map(|pair| [pair[0], pair[1]]),

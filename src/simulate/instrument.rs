@@ -62,6 +62,7 @@ impl Instrument {
             view: View {
                 camera: nominal.true_camera(options.seed),
                 vignetting: options.flaws.vignetting,
+                psf_px: options.flaws.psf_px,
             },
             lights: true_lights(&rig, options.seed),
             ambient: AMBIENT.map(|a| a * options.flaws.ambient),

@@ -1,7 +1,7 @@
 use super::SimulateError;
 use crate::files::Setting;
 use std::path::PathBuf;
-use weavelight_sim::cloth::{Preset, Print, Structure, Wrinkles};
+use weavelight_sim::cloth::{Preset, Print, Relief, Structure, Wrinkles, Yarn};
 use weavelight_sim::render::{Bounce, Extent, Fabric};
 use weavelight_sim::sensor::{Noise, Sensor};
 
@@ -54,6 +54,12 @@ pub struct Material {
     pub threads_per_cm: Option<f64>,
     /// Half the width of a yarn in place of the structure's usual one, millimetres.
     pub yarn_radius_mm: Option<f64>,
+    /// Diffuse reflectance of the warp's crowns (a knit's only yarn) in place of the preset's, linear sRGB.
+    pub warp_color: Option<[f64; 3]>,
+    /// Of the weft's crowns.
+    pub weft_color: Option<[f64; 3]>,
+    /// By which share yarns are darker between their crowns than on them, in place of the preset's: dye wears off crowns.
+    pub wear: Option<f64>,
     /// A coloured print.
     pub print: bool,
     /// Height of wrinkles, millimetres.
@@ -102,6 +108,8 @@ pub struct Flaws {
     pub ruler_error_mm: f64,
     /// Share of the light that the lens loses in the farthest corner.
     pub vignetting: f64,
+    /// Gaussian blur of lens and optical low-pass filter, standard deviation, photosites.
+    pub psf_px: f64,
     /// Ambient light: what it adds on white, relative to a light of intensity 1, times 0.005.
     pub ambient: f64,
     /// How far every lamp has changed at the end of a capture session, relative.
@@ -175,6 +183,9 @@ impl Default for Material {
             structure: None,
             threads_per_cm: None,
             yarn_radius_mm: None,
+            warp_color: None,
+            weft_color: None,
+            wear: None,
             print: false,
             wrinkles_mm: 0.0,
             thickness_mm: 0.0,
@@ -209,6 +220,7 @@ impl Default for Flaws {
         Self {
             ruler_error_mm: 0.0,
             vignetting: 0.1,
+            psf_px: 0.7,
             ambient: 1.0,
             drift: 0.0,
             swapped: None,
@@ -249,6 +261,7 @@ impl Options {
         let limits = [
             ("threads-per-cm", material.threads_per_cm.unwrap_or(10.0), 1.0, 200.0),
             ("yarn-radius-mm", material.yarn_radius_mm.unwrap_or(0.3), 0.01, 5.0),
+            ("wear", material.wear.unwrap_or(0.0), 0.0, 1.0),
             ("wrinkles-mm", material.wrinkles_mm, 0.0, 10.0),
             ("thickness-mm", material.thickness_mm, 0.0, 100.0),
             ("swatch-mm", width_mm, 1.0, 1e4),
@@ -265,6 +278,7 @@ impl Options {
             ("dust", targets.dust_per_dm2, 0.0, 600.0),
             ("ruler-error-mm", flaws.ruler_error_mm, 0.0, 100.0),
             ("vignetting", flaws.vignetting, 0.0, 0.9),
+            ("psf-px", flaws.psf_px, 0.0, 4.0),
             ("ambient", flaws.ambient, 0.0, 1000.0),
             ("drift", flaws.drift, -0.9, 9.0),
             ("exposure-factor", flaws.exposure_factor, 1e-3, 1e3),
@@ -273,9 +287,36 @@ impl Options {
             ("prnu", flaws.prnu, 0.0, 0.2),
             ("read-noise-e", flaws.read_noise_e, 0.0, 1000.0),
         ];
-        limits
-            .into_iter()
-            .try_for_each(|(name, value, least, most)| in_range(Setting(name), value, least, most))
+        limits.into_iter().try_for_each(|(name, value, least, most)| {
+            in_range(Setting(name), value, least, most)
+        })?;
+        self.check_colors()
+    }
+
+    /// Colours are reflectances, of yarns that the cloth has.
+    fn check_colors(&self) -> Result<(), SimulateError> {
+        let material = &self.material;
+        let colors = [("warp-color", material.warp_color), ("weft-color", material.weft_color)];
+        for (name, color) in colors {
+            color.iter().flatten().try_for_each(|c| in_range(Setting(name), *c, 0.0, 1.0))?;
+        }
+        let relief = self.fabric().cloth.relief;
+        let refused = |name, remedy: &str| {
+            Err(SimulateError::Option {
+                option: Setting(name),
+                value: "no use".to_owned(),
+                remedy: remedy.to_owned(),
+            })
+        };
+        match relief {
+            Relief::Woven(_) => Ok(()),
+            Relief::Knit(_) if material.weft_color.is_none() => Ok(()),
+            Relief::Knit(_) => refused("weft-color", "a knit has one yarn: give the warp's colour"),
+            _ if material.warp_color.is_some() => refused("warp-color", NO_YARNS),
+            _ if material.weft_color.is_some() => refused("weft-color", NO_YARNS),
+            _ if material.wear.is_some() => refused("wear", NO_YARNS),
+            _ => Ok(()),
+        }
     }
 
     /// The fabric on the table.
@@ -288,6 +329,14 @@ impl Options {
         {
             cloth.relief =
                 structure.relief(material.threads_per_cm, material.yarn_radius_mm, self.seed);
+        }
+        match &mut cloth.relief {
+            Relief::Woven(woven) => {
+                dye(&mut woven.warp, material.warp_color, material.wear);
+                dye(&mut woven.weft, material.weft_color, material.wear);
+            }
+            Relief::Knit(knit) => dye(&mut knit.yarn, material.warp_color, material.wear),
+            Relief::Flat(_) | Relief::Facets(_) | Relief::Pile(_) => {}
         }
         cloth.print = material.print.then(|| Print::new(self.seed));
         cloth.wrinkles =
@@ -312,6 +361,20 @@ impl Options {
             seed: self.seed,
             ..Sensor::default()
         }
+    }
+}
+
+const NO_YARNS: &str = "this cloth has no yarns; choose a woven or knitted one";
+
+/// Dyes a yarn anew; where only its colour is given, it stays as worn as it was.
+fn dye(yarn: &mut Yarn, color: Option<[f64; 3]>, wear: Option<f64>) {
+    if let Some(color) = color {
+        let kept: [f32; 3] = std::array::from_fn(|c| yarn.color_low[c] / yarn.color[c].max(1e-6));
+        yarn.color = color.map(|c| c as f32);
+        yarn.color_low = std::array::from_fn(|c| yarn.color[c] * kept[c]);
+    }
+    if let Some(wear) = wear {
+        yarn.color_low = yarn.color.map(|c| c * (1.0 - wear as f32));
     }
 }
 

@@ -59,7 +59,7 @@ fn first_seed() -> u64 {
 fn key_of(setting: Setting) -> String {
     let table = match setting.0 {
         "threads-per-cm" | "yarn-radius-mm" | "wrinkles-mm" | "thickness-mm" | "swatch-mm"
-        | "samples" => "material",
+        | "samples" | "warp-color" | "weft-color" | "wear" => "material",
         _ => "flaws",
     };
     format!("{table}.{}", setting.0.replace('-', "_"))
@@ -72,6 +72,9 @@ struct MaterialTable {
     structure: Option<String>,
     threads_per_cm: Option<f64>,
     yarn_radius_mm: Option<f64>,
+    warp_color: Option<[f64; 3]>,
+    weft_color: Option<[f64; 3]>,
+    wear: Option<f64>,
     print: bool,
     wrinkles_mm: f64,
     thickness_mm: f64,
@@ -84,6 +87,7 @@ struct MaterialTable {
 #[serde(deny_unknown_fields, default)]
 struct FlawsTable {
     vignetting: f64,
+    psf_px: f64,
     ambient: f64,
     drift: f64,
     swapped: Option<[usize; 2]>,
@@ -242,6 +246,9 @@ fn material(document: &Document, table: &MaterialTable) -> Result<Material, File
         structure: structure.transpose()?,
         threads_per_cm: table.threads_per_cm,
         yarn_radius_mm: table.yarn_radius_mm,
+        warp_color: table.warp_color,
+        weft_color: table.weft_color,
+        wear: table.wear,
         print: table.print,
         wrinkles_mm: table.wrinkles_mm,
         thickness_mm: table.thickness_mm,
@@ -255,6 +262,7 @@ fn flaws(table: &FlawsTable) -> Flaws {
     Flaws {
         ruler_error_mm: 0.0,
         vignetting: table.vignetting,
+        psf_px: table.psf_px,
         ambient: table.ambient,
         drift: table.drift,
         swapped: table.swapped,
@@ -270,13 +278,15 @@ fn flaws(table: &FlawsTable) -> Flaws {
 
 impl Default for FlawsTable {
     fn default() -> Self {
-        table_from_flaws(&Flaws::default())
+        // A file from before lenses blurred says nothing of it.
+        table_from_flaws(&Flaws { psf_px: 0.0, ..Flaws::default() })
     }
 }
 
 fn table_from_flaws(flaws: &Flaws) -> FlawsTable {
     FlawsTable {
         vignetting: flaws.vignetting,
+        psf_px: flaws.psf_px,
         ambient: flaws.ambient,
         drift: flaws.drift,
         swapped: flaws.swapped,
@@ -308,6 +318,9 @@ fn file_from_scene(scene: &Scene) -> SceneFile {
             structure: material.structure.map(|structure| structure.name().to_owned()),
             threads_per_cm: material.threads_per_cm,
             yarn_radius_mm: material.yarn_radius_mm,
+            warp_color: material.warp_color,
+            weft_color: material.weft_color,
+            wear: material.wear,
             print: material.print,
             wrinkles_mm: material.wrinkles_mm,
             thickness_mm: material.thickness_mm,
@@ -329,7 +342,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut options = Options { seed: 7, size_px: Some([64, 48]), ..Options::default() };
         options.material.preset = Preset::Denim;
-        options.material.structure = Some(Structure::Flat);
+        options.material.structure = Some(Structure::Rib);
+        options.material.warp_color = Some([0.5, 0.25, 0.125]);
+        options.material.wear = Some(0.4);
+        options.flaws.psf_px = 1.25;
         options.material.extent_mm = Some([90.0, 60.0]);
         options.flaws.swapped = Some([1, 2]);
         options.flaws.ruler_error_mm = 8.0;
@@ -358,6 +374,14 @@ mod tests {
         check(
             "schema = 1\n[flaws]\nprnu = 3.0\n",
             ":3: `flaws.prnu` is 3; give a number from 0 to 0.2",
+        );
+        check(
+            "schema = 1\n[flaws]\npsf_px = -1.0\n",
+            ":3: `flaws.psf_px` is -1; give a number from 0 to 4",
+        );
+        check(
+            "schema = 1\n[material]\npreset = \"velvet\"\nwear = 0.4\n",
+            ":3: `material.wear` is no use; this cloth has no yarns",
         );
         check("schema = 2\n", "schema 2");
         check("schema = 1\n[table]\nlies = \"cat\"\n", "swatch, board, grey or white");

@@ -39,7 +39,7 @@ impl Bench {
             size_px: Some(SIZE),
             seed: 3,
             only: only.to_vec(),
-            flaws: Flaws { ruler_error_mm: 10.0, vignetting: 0.2, ..Flaws::default() },
+            flaws: Flaws { ruler_error_mm: 10.0, vignetting: 0.2, psf_px: 0.0, ..Flaws::default() },
             targets: Targets { unevenness: 0.02, ..Targets::default() },
             ..Options::default()
         };

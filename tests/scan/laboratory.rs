@@ -14,7 +14,7 @@ use weavelight::device::scan::{About, Begin, Control, Options, ScanError, Subjec
 use weavelight::files::sha256_of_file;
 use weavelight::instrument::Rig;
 use weavelight::session::Session;
-use weavelight::simulate::{self, Part, Scene};
+use weavelight::simulate::{self, Flaws, Part, Scene};
 use weavelight_sim::cloth::Preset;
 
 /// Exposure of the tests: short in time, long in light.
@@ -64,6 +64,8 @@ impl Laboratory {
             out: home.path().join("rig"),
             size_px: Some(size_px),
             only: vec![Part::Swatch],
+            // Blur costs a simulated camera time that a real one does not take.
+            flaws: Flaws { psf_px: 0.0, ..Flaws::default() },
             ..simulate::Options::default()
         };
         change(&mut options);

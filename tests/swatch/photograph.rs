@@ -1,7 +1,7 @@
 //! A piece of cloth under the reference rig, small enough for a test and at the size of a pixel that a real scan has.
 
 use std::path::{Path, PathBuf};
-use weavelight::simulate::{self, Material, Part};
+use weavelight::simulate::{self, Flaws, Material, Part};
 use weavelight::solve::Scene;
 use weavelight_sim::rig::REFERENCE_LIGHTS_MM;
 
@@ -39,6 +39,7 @@ impl Scan {
             size_px: (field == Field::Whole).then_some([width, height]),
             only: vec![Part::Swatch],
             material,
+            flaws: Flaws { psf_px: 0.0, ..Flaws::default() },
             ..simulate::Options::default()
         };
         change(&mut options);
