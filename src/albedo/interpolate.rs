@@ -1,4 +1,4 @@
-//! Demosaicing of parts without structure, and two published demosaicers to compare with.
+//! Demosaicing of parts without structure.
 //!
 //! Green along the edge (after Menon, Andriani, Calvagno, "Demosaicing with directional filtering and a posteriori
 //! decision", IEEE Trans. Image Processing 2007), red and blue by interpolated residuals of a guided filter (after Kiku,
@@ -13,12 +13,12 @@ const GUIDE_REACH: usize = 5;
 const GUIDE_NOISE: f32 = 1e-6;
 
 /// A part of the mosaic with a margin; what is unknown is filled in.
-struct Part {
-    width: usize,
+pub(super) struct Part {
+    pub(super) width: usize,
     height: usize,
     /// Linear values.
-    own: Vec<f32>,
-    channel: Vec<u8>,
+    pub(super) own: Vec<f32>,
+    pub(super) channel: Vec<u8>,
 }
 
 /// Red, green and blue of a part, row by row. `value` gives the mosaic, `None` where unknown.
@@ -35,7 +35,7 @@ pub(super) fn residual_interpolation(
     let mut out = Vec::with_capacity(columns.len() * rows.len());
     for y in 0..rows.len() {
         for x in 0..columns.len() {
-            let at = (y + MARGIN) * part.width + x + MARGIN;
+            let at = part.at([x, y]);
             let mut rgb = [red[at], green[at], blue[at]].map(|value| value.max(0.0));
             rgb[usize::from(part.channel[at])] = part.own[at];
             out.push(rgb);
@@ -56,7 +56,8 @@ fn reflected(place: isize, length: usize) -> usize {
 }
 
 impl Part {
-    fn new(
+    /// Of some columns and rows.
+    pub(super) fn new(
         [width, height]: [usize; 2],
         cfa: Cfa,
         value: &dyn Fn(usize, usize) -> Option<f32>,
@@ -83,6 +84,11 @@ impl Part {
         }
         part.fill();
         part
+    }
+
+    /// Index of a place without the margin.
+    pub(super) fn at(&self, [x, y]: [usize; 2]) -> usize {
+        (y + MARGIN) * self.width + x + MARGIN
     }
 
     /// Gives unknown photosites the mean of the known ones of their channel near by, else of the whole part.

@@ -14,7 +14,9 @@ mod guard;
 mod interpolate;
 mod numeric;
 mod output;
+mod pitch;
 mod print;
+mod published;
 mod relief;
 mod shading;
 #[cfg(test)]
@@ -22,3 +24,5 @@ mod tests;
 
 pub use guard::BRIGHTEST;
 pub use output::{Colours, Figures, Input, Refused, find_colours};
+pub use pitch::yarn_pitch;
+pub use published::Demosaicer;
