@@ -140,6 +140,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "linear",
             "machine",
             "photometry",
+            "quantity",
             "raster",
             "raw",
             "session",
@@ -159,7 +160,20 @@ const ROOMS: &[(&str, &[&str])] = &[
     ("doctor", &["device", "files", "gpu"]),
     ("report", &["compare", "raster", "solution", "solve"]),
     ("demo", &["compare", "report", "simulate", "solution", "solve"]),
-    ("bench", &["compare", "files", "gpu", "photometry", "raw", "simulate", "solution", "solve"]),
+    (
+        "bench",
+        &[
+            "albedo",
+            "compare",
+            "files",
+            "gpu",
+            "photometry",
+            "raw",
+            "simulate",
+            "solution",
+            "solve",
+        ],
+    ),
     (
         "cli",
         &[

@@ -54,6 +54,9 @@ pub(super) struct Args {
     /// What the albedo is: reflectance, with the shading of unresolved relief divided out into shade.exr, or as it appears
     #[arg(long, default_value = "reflectance")]
     albedo: AlbedoName,
+    /// What a spectrophotometer reads of this cloth (CIE L*a*b*, D50, 2 degrees): the reflectance is scaled to that lightness
+    #[arg(long, value_name = "L,a,b", value_parser = super::simulate::triple, allow_negative_numbers = true)]
+    reference_lab: Option<[f64; 3]>,
     /// Make only these, comma-separated: maps, png for both as pictures, page for report.html [default: all]
     #[arg(long, value_name = "MAP,...", value_delimiter = ',')]
     only: Vec<Wanted>,
@@ -206,6 +209,7 @@ impl Args {
         options.reuse = if self.force { Reuse::Never } else { Reuse::IfCurrent };
         options.residuals = if self.residuals { Residuals::Write } else { Residuals::Leave };
         options.albedo = self.albedo.into();
+        options.reference_lab = self.reference_lab;
         options.threads = self.threads.map(|count| usize::try_from(count).unwrap_or(usize::MAX));
         Ok(options)
     }
@@ -253,9 +257,17 @@ fn text(report: &Report) -> String {
         side => format!("pixels of {side} x {side} photosites"),
     };
     let kind = report.albedo.as_ref().map_or("albedo", |albedo| albedo.kind.as_str());
+    let level = report.albedo.as_ref().and_then(|albedo| albedo.reference.as_ref());
+    let level = level.map_or_else(String::new, |level| {
+        let [l, a, b] = level.lab_d50;
+        format!(
+            "\nlevel scaled by {:.3} to L* {l}; {:.1} CIEDE2000 to {l}, {a}, {b} left",
+            level.factor, level.remaining_de2000
+        )
+    });
     format!(
         "{:.1} % of {} {what} solved from {} lights{scale}\n\
-         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, {kind} in {}, {seconds:.1} s{with}",
+         robust path {:.2} %, clipped samples at {:.2} %{defective}, residual {:.5} of white, {kind} in {}, {seconds:.1} s{with}{level}",
         percent(report.solved),
         report.pixels,
         report.lights_used.len(),

@@ -7,7 +7,7 @@ mod report;
 pub use choices::{AlbedoKind, Grid, NormalY, Outputs, Residuals, Reuse, Scale};
 pub use maps::Finished;
 pub use report::{
-    AlbedoReport, DeviceReport, InputFolders, PlaneReport, Report, ResidualFile,
+    AlbedoReport, DeviceReport, InputFolders, PlaneReport, ReferenceReport, Report, ResidualFile,
     SCHEMA as REPORT_SCHEMA,
 };
 

@@ -123,6 +123,23 @@ pub struct AlbedoReport {
     /// Photosites whose value no reflectance can have, and that were limited.
     #[serde(default)]
     pub clamped: u64,
+    /// Distance of the yarns in photosites, where the normals show one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yarns_px: Option<f64>,
+    /// The reading that the level was scaled to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<ReferenceReport>,
+}
+
+/// A reading that the albedo's level was scaled to, in `report.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReferenceReport {
+    /// CIE L*a*b*, D50, 2 degrees.
+    pub lab_d50: [f64; 3],
+    /// What the albedo was multiplied by.
+    pub factor: f64,
+    /// CIEDE2000 between the scaled albedo's mean and the reading: what one factor cannot mend.
+    pub remaining_de2000: f64,
 }
 
 /// Who solved, in `report.json`.
@@ -305,6 +322,12 @@ mod tests {
                 dyes: Some(1),
                 gated_share: 0.25,
                 clamped: 3,
+                yarns_px: Some(2.3),
+                reference: Some(ReferenceReport {
+                    lab_d50: [62.0, 3.5, 12.25],
+                    factor: 1.0625,
+                    remaining_de2000: 0.5,
+                }),
             }),
             residuals: vec![ResidualFile { light: 3, file: "residual-03.exr".into() }],
             warnings: vec!["light 1 has no frame".into()],

@@ -136,8 +136,9 @@ fn settings(options: &Options) -> String {
     let residuals = if options.residuals == Residuals::Write { "written" } else { "left" };
     let scale = options.scale as usize;
     let albedo = options.albedo.name();
+    let level = options.reference_lab.map_or_else(String::new, |lab| format!(", level {lab:?}"));
     format!(
-        "{PROGRAM}, solve {REVISION}: method {method}, grid {grid}, normal-y {normal_y}, scale {scale}, mask {mask}, device {device}, residuals {residuals}, albedo {albedo}"
+        "{PROGRAM}, solve {REVISION}: method {method}, grid {grid}, normal-y {normal_y}, scale {scale}, mask {mask}, device {device}, residuals {residuals}, albedo {albedo}{level}"
     )
 }
 

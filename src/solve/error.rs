@@ -44,6 +44,12 @@ pub enum SolveError {
         /// The folder.
         calibration: PathBuf,
     },
+    /// A reading that no spectrophotometer gives, or one that the solve has no use for.
+    #[error("{} {what}", Setting("reference-lab"))]
+    Reference {
+        /// What is wrong with it and what to do; follows its name.
+        what: String,
+    },
     /// Fewer than three lights were photographed.
     #[error("{}: frames of {found} light{} only; photograph at least three lights, not all in one plane with the swatch", .session.display(), if *.found == 1 { "" } else { "s" })]
     TooFewLights {

@@ -35,6 +35,9 @@ pub struct Options {
     pub residuals: Residuals,
     /// What the albedo means.
     pub albedo: AlbedoKind,
+    /// What a spectrophotometer reads of the same cloth: CIE L*a*b*, D50, 2 degrees, mean over its aperture. The albedo is
+    /// scaled to that lightness.
+    pub reference_lab: Option<[f64; 3]>,
 }
 
 impl Options {
@@ -60,6 +63,7 @@ impl Options {
             reuse: Reuse::IfCurrent,
             residuals: Residuals::Leave,
             albedo: AlbedoKind::Reflectance,
+            reference_lab: None,
         }
     }
 }

@@ -21,6 +21,7 @@ use crate::solve::output::encode::write_maps;
 use crate::solve::output::finish::{
     color_space, finish, leave_out_what_is_not_finite, pinhole, undistort,
 };
+use crate::solve::output::level::{check_reference, scale_to_reference};
 use crate::solve::progress::{Progress, Stage};
 use crate::solve::scene::Scene;
 use crate::solve::scene::load::{Loaded, load, unverified};
@@ -88,6 +89,7 @@ fn run_on_this_pool(
     if options.grid == Grid::Undistorted && calibration.camera.is_none() {
         return Err(SolveError::NothingToUndistort { calibration: calibration.folder });
     }
+    check_reference(options, &calibration)?;
     let before = match options.reuse {
         Reuse::IfCurrent => still_current(options, &inputs.key(options), &session, page.is_some()),
         Reuse::Never => None,
@@ -136,7 +138,7 @@ fn make(
     let counts = maps.counts;
     let shown = page.is_some();
     let wanted = Outputs {
-        albedo: options.outputs.albedo || shown,
+        albedo: options.outputs.albedo || shown || options.reference_lab.is_some(),
         shade: options.outputs.shade || shown,
         ..options.outputs
     };
@@ -145,6 +147,9 @@ fn make(
         warnings.append(&mut maps.said);
     }
     warnings.extend(leave_out_what_is_not_finite(&mut maps));
+    if let Some(lab) = options.reference_lab {
+        warnings.extend(scale_to_reference(&mut maps, lab)?);
+    }
     let finished = on_grid(maps, rest.camera.as_ref(), options.grid);
     watch.lap(Stage::Colour);
     write_maps(staged.path(), &finished, options, progress)?;

@@ -1,6 +1,7 @@
 //! From the albedo of the layout of the frames to linear RGB, and the shade beside it.
 
 use crate::albedo::{self, Figures, Input};
+use crate::files::Setting;
 use crate::instrument::Color;
 use crate::photometry::Albedo;
 use crate::raw::demosaic;
@@ -68,6 +69,8 @@ fn report(kind: AlbedoKind) -> AlbedoReport {
         dyes: None,
         gated_share: 0.0,
         clamped: 0,
+        yarns_px: None,
+        reference: None,
     }
 }
 
@@ -99,14 +102,18 @@ fn of_mosaic(
             *shade = if *solved != 0 { 1.0 } else { 0.0 };
         }
     });
+    let yarns_px = albedo::yarn_pitch(normal, mask);
+    let mut said = level_warning(&figures, kind);
+    said.extend(yarns_px.and_then(capture_advice));
     let report = AlbedoReport {
+        yarns_px,
         level_sigma: Some(figures.level_sigma),
         dyes: Some(if figures.several_share > 0.5 { 2 } else { 1 }),
         gated_share: figures.gated_share,
         clamped: figures.limited as u64,
         ..report(kind)
     };
-    Coloured { albedo: reflectance, shade, report, said: level_warning(&figures, kind) }
+    Coloured { albedo: reflectance, shade, report, said }
 }
 
 /// Above this share, that the level reads low is worth a sentence.
@@ -122,9 +129,30 @@ fn level_warning(figures: &Figures, kind: AlbedoKind) -> Vec<String> {
     };
     let percent = 100.0 * figures.reads_low;
     vec![format!(
-        "The albedo reads up to {percent:.0} % low: {why}. One reading of a spectrophotometer on the same cloth, or the cloth \
-         photographed beside a white card, gives the factor that is missing."
+        "The albedo reads up to {percent:.0} % low: {why}. One reading of a spectrophotometer on the same cloth ({}), or the \
+         cloth photographed beside a white card, gives the factor that is missing.",
+        Setting("reference-lab")
     )]
+}
+
+/// Yarns nearer to each other than this are near the Nyquist frequency of the mosaic, whose red and blue photosites lie two
+/// apart: a period of four.
+const FINE_YARNS_PX: f64 = 4.5;
+/// Mean CIEDE2000 of weaves of one dye by the distance of their yarns, photosites: simulated, lens blur of 0.7 px.
+const EXPECTED_ERROR: [[f64; 2]; 4] = [[2.0, 3.5], [2.6, 2.9], [4.0, 1.8], [7.0, 0.7]];
+
+/// What to do where yarns are too fine for their colours.
+fn capture_advice(yarns_px: f64) -> Option<String> {
+    let error = EXPECTED_ERROR.windows(2).find(|pair| yarns_px < pair[1][0]).map(|pair| {
+        let share = ((yarns_px - pair[0][0]) / (pair[1][0] - pair[0][0])).max(0.0);
+        pair[0][1] + share * (pair[1][1] - pair[0][1])
+    })?;
+    (yarns_px < FINE_YARNS_PX).then(|| {
+        format!(
+            "Yarns of {yarns_px:.1} px are near the limit of the sensor's colour filters: move the camera nearer, until they \
+             are {FINE_YARNS_PX} px apart, or accept colours that are off by about {error:.1} CIEDE2000."
+        )
+    })
 }
 
 /// The albedo with its shading; says why, where reflectance was asked for.
@@ -163,4 +191,18 @@ fn limit(albedo: &mut Image<[f32; 3]>) -> u64 {
         changed
     };
     albedo.data.par_iter_mut().map(limit).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fine_yarns_are_advised_against() {
+        let said = capture_advice(2.3).unwrap();
+        assert!(said.starts_with("Yarns of 2.3 px are near the limit"), "{said}");
+        assert!(said.ends_with("about 3.2 CIEDE2000."), "{said}");
+        assert!(capture_advice(1.9).unwrap().ends_with("about 3.5 CIEDE2000."));
+        assert_eq!((capture_advice(4.6), capture_advice(40.0)), (None, None));
+    }
 }

@@ -3,3 +3,4 @@
 mod colour;
 pub(crate) mod encode;
 pub(crate) mod finish;
+pub(crate) mod level;
