@@ -8,6 +8,8 @@
 pub mod band;
 mod chart;
 mod clock;
+mod cloths;
+mod colors;
 mod curves;
 mod error;
 mod front;
@@ -19,6 +21,8 @@ mod sets;
 mod table;
 
 pub use clock::{Spent, timed};
+pub use cloths::ColorCloth;
+pub use colors::{ColorOptions, ColorRow, Worst, colors_markdown, measure_colors};
 pub use curves::{Curve, CurvePoint};
 pub use error::BenchError;
 pub use front::pareto_front;
@@ -38,6 +42,9 @@ pub const BENCH_JSON: &str = "bench.json";
 /// The picture, in the output folder.
 pub const BENCH_SVG: &str = "bench.svg";
 
+/// The table of colours, in the output folder where it was asked for.
+pub const COLORS_MD: &str = "colors.md";
+
 const OUTPUT: OutputKind = OutputKind { name: "benchmark", marker: Some(BENCH_JSON) };
 
 /// What to measure.
@@ -53,6 +60,8 @@ pub struct Options {
     pub effort: Effort,
     /// Whether to measure on generated bands of many sizes and light counts too.
     pub curves: Curves,
+    /// Colours to measure, for [`COLORS_MD`] too.
+    pub colors: Option<ColorOptions>,
 }
 
 /// How much to measure.
@@ -128,8 +137,17 @@ pub fn run(options: &Options, progress: &(dyn Fn(f64, &str) + Sync)) -> Result<R
         progress(sets.len() as f64 / steps, "curves");
         curves = curves::measure(options.effort);
     }
+    let mut colors = Vec::new();
+    if let Some(wanted) = &options.colors {
+        let done = sets.len() as f64 / steps;
+        colors = measure_colors(wanted, &|share, what| {
+            progress(done + (1.0 - done) * share, what);
+        })?;
+        write_atomic(&staged.join(COLORS_MD), colors_markdown(&colors).as_bytes())?;
+    }
     let threads = rayon::current_num_threads();
-    let report = Report { schema: SCHEMA, program: PROGRAM.to_owned(), threads, sets, curves };
+    let program = PROGRAM.to_owned();
+    let report = Report { schema: SCHEMA, program, threads, sets, curves, colors };
     write_atomic(&staged.join(BENCH_SVG), picture::svg(&report).as_bytes())?;
     write_atomic(&staged.join(BENCH_JSON), report.json().as_bytes())?;
     staged.commit()?;

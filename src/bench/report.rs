@@ -1,5 +1,6 @@
 //! The figures, as `bench.json` has them.
 
+use super::colors::ColorRow;
 use super::curves::Curve;
 use serde::Serialize;
 
@@ -17,6 +18,9 @@ pub struct Report {
     /// Time over megapixels and lights; empty where not asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub curves: Vec<Curve>,
+    /// Colours of the albedo; empty where not asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub colors: Vec<ColorRow>,
 }
 
 /// One picture set.

@@ -121,6 +121,7 @@ mod tests {
             threads: 2,
             sets: vec![set],
             curves: vec![],
+            colors: vec![],
         };
         let expected = "\
 linen: plain weave

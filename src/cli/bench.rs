@@ -3,7 +3,8 @@
 use super::output::{Failure, Output};
 use super::progress::Progress;
 use crate::bench::{
-    self, BENCH_SVG, Curves, Effort, Fabric, Options, SetFolders, curves_text, sets_text,
+    self, BENCH_SVG, ColorCloth, ColorOptions, Curves, Effort, Fabric, Options, SetFolders,
+    colors_markdown, curves_text, sets_text,
 };
 use std::path::PathBuf;
 
@@ -33,6 +34,42 @@ pub(super) struct Args {
     /// Measure time over 1 to 100 megapixels and over 3 to 64 lights too
     #[arg(long)]
     curves: bool,
+    /// Measure the colours of the albedo instead, as a Markdown table: on every cloth, without and with lens blur, beside
+    /// published demosaicers. Writes colors.md too
+    #[arg(long, conflicts_with_all = ["quick", "sets", "curves", "no_fabrics"])]
+    colors: bool,
+    /// For --colors: sizes of the frame over the whole field of view, comma-separated
+    #[arg(long, value_name = "WxH,...", value_delimiter = ',', value_parser = super::simulate::size, default_value = "1848x1224,1232x816", requires = "colors")]
+    sizes: Vec<[usize; 2]>,
+    /// For --colors: only the middle of the frame [default: all of it]
+    #[arg(long, value_name = "WxH", value_parser = super::simulate::size, requires = "colors")]
+    middle: Option<[usize; 2]>,
+    /// For --colors: lens blur, Gaussian sigma in photosites
+    #[arg(
+        long,
+        value_name = "S,...",
+        value_delimiter = ',',
+        default_value = "0,0.7",
+        requires = "colors"
+    )]
+    psf_px: Vec<f64>,
+    /// For --colors: seeds
+    #[arg(
+        long,
+        value_name = "N,...",
+        value_delimiter = ',',
+        default_value = "2,3",
+        requires = "colors"
+    )]
+    seeds: Vec<u64>,
+    /// For --colors: only these, semicolon-separated, by the names in the table [default: all]
+    #[arg(long, value_name = "NAME;...", value_delimiter = ';', value_parser = cloth, requires = "colors")]
+    cloths: Vec<ColorCloth>,
+}
+
+fn cloth(text: &str) -> Result<ColorCloth, String> {
+    let names = || ColorCloth::ALL.map(|cloth| cloth.name).join("; ");
+    ColorCloth::parse(text.trim()).ok_or_else(|| format!("choose from: {}", names()))
 }
 
 /// Reads `NAME=SESSION,CALIB,NORMALS.exr`.
@@ -54,12 +91,12 @@ fn set(text: &str) -> Result<SetFolders, String> {
 
 impl Args {
     fn options(&self) -> Result<Options, Failure> {
-        let fabrics = match (self.no_fabrics, self.quick) {
+        let fabrics = match (self.no_fabrics || self.colors, self.quick) {
             (true, _) => vec![],
             (false, true) => Fabric::FEW.to_vec(),
             (false, false) => Fabric::ALL.to_vec(),
         };
-        if fabrics.is_empty() && self.sets.is_empty() && !self.curves {
+        if fabrics.is_empty() && self.sets.is_empty() && !self.curves && !self.colors {
             return Err(Failure::call(
                 "--no-fabrics leaves nothing to measure; give --set or --curves as well",
             ));
@@ -70,7 +107,22 @@ impl Args {
             sets: self.sets.clone(),
             effort: if self.quick { Effort::Quick } else { Effort::Full },
             curves: if self.curves { Curves::Measure } else { Curves::Leave },
+            colors: self.colors.then(|| self.colors()),
         })
+    }
+
+    fn colors(&self) -> ColorOptions {
+        ColorOptions {
+            cloths: if self.cloths.is_empty() {
+                ColorCloth::ALL.to_vec()
+            } else {
+                self.cloths.clone()
+            },
+            sizes_px: self.sizes.clone(),
+            middle_px: self.middle,
+            psf_px: self.psf_px.clone(),
+            seeds: self.seeds.clone(),
+        }
     }
 }
 
@@ -80,6 +132,14 @@ pub(super) fn run(args: &Args) -> Result<Output, Failure> {
     let report = bench::run(&options, &|share, what: &str| progress.set(share, what))
         .map_err(Failure::work)?;
     drop(progress);
+    if args.colors {
+        return Ok(Output {
+            text: colors_markdown(&report.colors),
+            json: serde_json::to_value(&report).map_err(Failure::work)?,
+            warnings: vec![],
+            status: 0,
+        });
+    }
     let picture = args.out.join(BENCH_SVG);
     let text = [sets_text(&report), curves_text(&report.curves), picture.display().to_string()];
     let warnings = report

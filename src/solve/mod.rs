@@ -22,6 +22,7 @@ pub use bands::{Rows, SolvedScene};
 pub use error::SolveError;
 pub use mask::{MaskMade, MaskOptions, make_mask};
 pub use options::Options;
+pub(crate) use output::finish::finish;
 pub use progress::{Progress, Stage};
 pub use run::{Shown, Solved, run};
 pub use scene::{CheckedScene, Origin, Scene};
