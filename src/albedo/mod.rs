@@ -17,6 +17,8 @@ mod output;
 mod pitch;
 mod print;
 mod published;
+#[cfg(test)]
+mod reference;
 mod relief;
 mod shading;
 #[cfg(test)]

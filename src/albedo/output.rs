@@ -15,6 +15,8 @@ use weavelight_calibration::description::{Cfa, Channel, Image};
 
 /// Rows that a thread takes at a time.
 const BAND: usize = 32;
+/// Columns that are interpolated at a time where cloth is flat: the margin around them costs less the more they are.
+const FLAT_COLUMNS: usize = 192;
 /// Cells of the windows in which a cloth's colours are compared; a window holds four.
 const WIDE: usize = 128;
 /// The same for prints.
@@ -358,8 +360,8 @@ impl<'a> Found<'a> {
             let log = self.logs.data[y * width + x];
             (!log.is_nan()).then(|| exp(log))
         };
-        for start in (0..width).step_by(2 * BAND) {
-            let columns = start..(start + 2 * BAND).min(width);
+        for start in (0..width).step_by(FLAT_COLUMNS) {
+            let columns = start..(start + FLAT_COLUMNS).min(width);
             if self.structure.fills(&columns, &rows) {
                 continue;
             }

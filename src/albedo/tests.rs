@@ -91,6 +91,35 @@ impl Cloth {
     }
 }
 
+/// The fast path, in float32 with histograms and tables, against its definitions in float64.
+#[test]
+fn the_fast_path_agrees_with_float64() {
+    let mut cloth = Cloth::woven([250, 240], 5.3, [[0.5, 0.42, 0.3]; 2], Cfa::RGGB);
+    // Yarns of one hue in many shades: nothing is flat.
+    for k in 0..250 * 240 {
+        let yarn = ((k % 250) as f64 / 5.3) as usize * 7 + ((k / 250) as f64 / 5.5) as usize * 5;
+        cloth.mosaic.data[k] *= 0.7 + 0.05 * (yarn % 11) as f32;
+    }
+    let found = cloth.found();
+    assert_eq!((found.figures.limited, found.figures.several_share), (0, 0.0));
+    assert_eq!(found.figures.gated_share, 0.0);
+    let expected = reference::colours(&cloth.input());
+    let (mut square, mut worst) = (0.0f64, 0.0f64);
+    for k in 0..250 * 240 {
+        let shade = f64::from(found.shade.data[k]) / expected.shade.data[k];
+        assert!((shade - 1.0).abs() < 2e-3, "{k}: {}", found.shade.data[k]);
+        for c in 0..3 {
+            let off = f64::from(found.reflectance.data[k][c]) / expected.reflectance.data[k][c];
+            square += (off - 1.0).powi(2);
+            worst = worst.max((off - 1.0).abs());
+        }
+    }
+    let rms = (square / (3.0 * 250.0 * 240.0)).sqrt();
+    println!("rms {rms}, worst {worst}");
+    // Bins are 0.004 wide, and quantiles lie between them.
+    assert!(rms < 2e-3 && worst < 1e-2, "rms {rms}, worst {worst}");
+}
+
 #[test]
 fn one_dye_has_one_hue_and_no_shade_in_it() {
     let cloth = Cloth::linen([300, 280]);

@@ -9,8 +9,8 @@ use crate::photometry::Counts;
 use crate::photometry::Outcome;
 use crate::session::Session;
 use crate::solution::{
-    Finished, Grid, InputFolders, OUTPUT, Outputs, PlaneReport, REPORT_HTML, REPORT_JSON,
-    REPORT_SCHEMA, Report, Residuals, Reuse, Scale,
+    ALBEDO_EXR, Finished, Grid, InputFolders, OUTPUT, Outputs, PlaneReport, REPORT_HTML,
+    REPORT_JSON, REPORT_SCHEMA, Report, Residuals, Reuse, Scale,
 };
 use crate::solve::SolveError;
 use crate::solve::bands::SolvedScene;
@@ -156,6 +156,7 @@ fn make(
     copy_camera(&rest, options, staged.path())?;
     watch.lap(Stage::Write);
     let mut report = report(options, &rest, &finished, counts);
+    warnings.extend(albedo_changes(&options.out, &report));
     report.residuals = residuals.unwrap_or_default();
     report.warnings = warnings;
     report.device = Some(device);

@@ -197,6 +197,125 @@ fn limit(albedo: &mut Image<[f32; 3]>) -> u64 {
 mod tests {
     use super::*;
 
+    /// A weave of one dye, its relief, and where it is solved.
+    struct Cloth {
+        mosaic: Image<f32>,
+        cfa: Cfa,
+        normal: Image<[f32; 3]>,
+        mask: Image<u8>,
+    }
+
+    fn cloth(width: usize, height: usize) -> Cloth {
+        let cfa = Cfa::RGGB;
+        let slope = |k: usize| 1.2 * ((k as f32 + 0.5) / 5.3).fract() - 0.6;
+        let normal = |k: usize| {
+            let [a, b] = [slope(k % width), 0.5 * slope(k / width)];
+            let length = (a * a + b * b + 1.0).sqrt();
+            [-a / length, -b / length, 1.0 / length]
+        };
+        let value = |k: usize| {
+            let dye = [0.5, 0.4, 0.3][cfa.channel(k % width, k / width) as usize];
+            dye * (0.6 + 0.4 * normal(k)[2])
+        };
+        let image = |data| Image { width, height, data };
+        Cloth {
+            mosaic: image((0..width * height).map(value).collect()),
+            cfa,
+            normal: Image { width, height, data: (0..width * height).map(normal).collect() },
+            mask: Image { width, height, data: vec![255; width * height] },
+        }
+    }
+
+    impl Cloth {
+        fn coloured(&self, color: &Color) -> Coloured {
+            let albedo = Albedo::Mosaic(self.mosaic.clone(), self.cfa);
+            let wanted = (Outputs::ALL, AlbedoKind::Reflectance);
+            colour(albedo, &self.normal, &self.mask, color, wanted)
+        }
+
+        /// Nothing but interpolation, and a line that says why.
+        fn check_refused(&self, why: &str) {
+            let found = self.coloured(&Color::default());
+            let width = self.mosaic.width;
+            let known = |x: usize, y: usize| self.mask.data[y * width + x] != 0;
+            let mut expected = demosaic(&self.mosaic, self.cfa, &known);
+            limit(&mut expected);
+            let bits = |image: &Image<[f32; 3]>| -> Vec<u32> {
+                image.data.iter().flatten().map(|value| value.to_bits()).collect()
+            };
+            assert!(bits(&found.albedo) == bits(&expected), "{why}: not interpolated");
+            let [said] = &found.said[..] else { panic!("{why}: {:?}", found.said) };
+            assert!(said.starts_with("The albedo is as it appears"), "{said}");
+            assert!(said.contains(why), "{said}");
+            assert_eq!(found.report.kind, "appearance");
+            for (shade, mask) in found.shade.data.iter().zip(&self.mask.data) {
+                assert_eq!(*shade, if *mask != 0 { 1.0 } else { 0.0 });
+            }
+        }
+    }
+
+    #[test]
+    fn a_weave_is_not_refused() {
+        let found = cloth(200, 180).coloured(&Color::default());
+        assert_eq!(found.report.kind, "reflectance");
+        let pitch = found.report.yarns_px.unwrap();
+        assert!((pitch - 5.3).abs() < 0.1, "{pitch}");
+        let shaded = found.shade.data.iter().filter(|shade| **shade < 0.97).count();
+        assert!(shaded > 200 * 180 / 10, "{shaded}");
+    }
+
+    #[test]
+    fn what_cannot_be_done_is_done_as_before_and_told() {
+        cloth(120, 300).check_refused("smaller than 128 x 128");
+        let mut slivers = cloth(300, 300);
+        (0..300 * 300).filter(|k| k % 300 % 3 == 2).for_each(|k| slivers.mask.data[k] = 0);
+        slivers.check_refused("too thin or too few");
+        let mut small = cloth(300, 300);
+        (0..300 * 300).filter(|k| k % 300 > 90).for_each(|k| small.mask.data[k] = 0);
+        (0..300 * 300).filter(|k| k / 300 > 90).for_each(|k| small.mask.data[k] = 0);
+        small.check_refused("smaller than 128 x 128");
+        let mut without = cloth(200, 200);
+        let blue = |k: usize| k % 2 == 1 && k / 200 % 2 == 1;
+        (0..200 * 200).filter(|k| blue(*k)).for_each(|k| without.mask.data[k] = 0);
+        without.check_refused("no photosite has a value in blue");
+        let mut other = cloth(200, 200);
+        other.cfa = Cfa::parse("RGBG").unwrap();
+        other.check_refused("not in a Bayer pattern");
+        let mut unknown = cloth(200, 200);
+        unknown.normal.data.fill([f32::NAN; 3]);
+        unknown.check_refused("smaller than 128 x 128");
+    }
+
+    #[test]
+    fn frames_without_a_mosaic_say_so() {
+        let made = cloth(200, 180);
+        let kinds = [
+            (Albedo::Grey(made.mosaic.clone()), "no colour filters"),
+            (Albedo::Rgb(Image::filled(200, 180, [0.4; 3])), "three colours at every pixel"),
+        ];
+        for (albedo, why) in kinds {
+            let wanted = (Outputs::ALL, AlbedoKind::Reflectance);
+            let found = colour(albedo, &made.normal, &made.mask, &Color::default(), wanted);
+            assert!(found.said[0].contains(why), "{:?}", found.said);
+            assert_eq!(found.report.kind, "appearance");
+        }
+    }
+
+    /// Single normals that are no numbers are single holes; one without a matrix keeps the camera's colours.
+    #[test]
+    fn holes_in_the_normals_spread_nowhere() {
+        let (clean, mut holed) = (cloth(220, 200), cloth(220, 200));
+        let hole = |k: usize| k % 997 == 0;
+        (0..220 * 200).filter(|k| hole(*k)).for_each(|k| holed.normal.data[k] = [f32::NAN; 3]);
+        let (a, b) = (clean.coloured(&Color::default()), holed.coloured(&Color::default()));
+        assert_eq!(b.report.kind, "reflectance");
+        for (k, (a, b)) in a.albedo.data.iter().zip(&b.albedo.data).enumerate() {
+            let apart = (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max);
+            assert!(b.iter().all(|value| value.is_finite()), "{k}: {b:?}");
+            assert!(hole(k) || apart < 0.03, "{k}: {a:?} and {b:?}");
+        }
+    }
+
     #[test]
     fn fine_yarns_are_advised_against() {
         let said = capture_advice(2.3).unwrap();

@@ -181,6 +181,28 @@ fn albedo_times_shade_is_the_photosites_own_value() {
     }
 }
 
+/// A solution from before shade was divided out holds no word of what its albedo is.
+#[test]
+fn that_the_albedo_changes_its_meaning_is_told_once() {
+    let cfa = weavelight_calibration::description::Cfa::RGGB;
+    let recipe =
+        Recipe { width: 160, height: 150, layout: Layout::Mosaic(cfa), ..Recipe::default() };
+    let folders = Folders::of(&scene(recipe));
+    let options = Options { reuse: Reuse::Never, ..folders.options() };
+    let told = || {
+        let report = run(&options, &|_| {}).unwrap().report;
+        report.warnings.iter().any(|said| said.contains("differs from that of the earlier"))
+    };
+    assert!(!told(), "there was none");
+    let path = options.out.join("report.json");
+    let mut report = solution::Report::read(&path).unwrap();
+    report.albedo = None;
+    report.write(&path).unwrap();
+    std::fs::remove_file(options.out.join("shade.exr")).unwrap();
+    assert!(told(), "the first time");
+    assert!(!told(), "the second time");
+}
+
 /// Names of files that are not the same in both.
 fn differing<'a>(a: &'a BTreeMap<String, Vec<u8>>, b: &BTreeMap<String, Vec<u8>>) -> Vec<&'a str> {
     a.iter()
