@@ -144,3 +144,23 @@ fn calls_and_truths_that_make_no_sense_are_refused() {
     );
     assert_eq!(home.names(), ["c", "s", "truth.exr"]);
 }
+
+/// One row a cloth, as a Markdown table and in JSON.
+#[test]
+fn colours_are_measured_and_tabled() {
+    let home = Home::new();
+    let said = home
+        .run(
+            "bench --colors --out b --sizes 616x408 --middle 160x144 --psf-px 0,0.7 --seeds 2 --cloths facets;velvet --json",
+        )
+        .json();
+    let rows = said["colors"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|row| row["cloth"].as_str().unwrap()).collect();
+    assert_eq!(names, ["facets", "facets", "velvet", "velvet"]);
+    for row in rows {
+        assert!(row["figures"]["mean_de2000"].as_f64().unwrap() < 3.0, "{row}");
+        assert_eq!(row["demosaicers"].as_array().unwrap().len(), 3, "{row}");
+    }
+    let table = home.read("b/colors.md");
+    assert_eq!(table.lines().count(), 6, "{table}");
+}
