@@ -107,7 +107,7 @@ fn the_fast_path_agrees_with_float64() {
     let (mut square, mut worst) = (0.0f64, 0.0f64);
     for k in 0..250 * 240 {
         let shade = f64::from(found.shade.data[k]) / expected.shade.data[k];
-        assert!((shade - 1.0).abs() < 2e-3, "{k}: {}", found.shade.data[k]);
+        assert!((shade - 1.0).abs() < 2e-4, "{k}: {}", found.shade.data[k]);
         for c in 0..3 {
             let off = f64::from(found.reflectance.data[k][c]) / expected.reflectance.data[k][c];
             square += (off - 1.0).powi(2);
@@ -116,8 +116,7 @@ fn the_fast_path_agrees_with_float64() {
     }
     let rms = (square / (3.0 * 250.0 * 240.0)).sqrt();
     println!("rms {rms}, worst {worst}");
-    // Bins are 0.004 wide, and quantiles lie between them.
-    assert!(rms < 2e-3 && worst < 1e-2, "rms {rms}, worst {worst}");
+    assert!(rms < 1e-4 && worst < 5e-4, "rms {rms}, worst {worst}");
 }
 
 #[test]
@@ -165,6 +164,43 @@ fn dyes_that_are_equal_in_green_are_no_worse_than_interpolated() {
         let [_, before] = cloth.errors(&cloth.interpolated());
         println!("{pitch} px: {hue}, interpolated {before}");
         assert!(hue < before, "{pitch} px: {hue}, interpolated {before}");
+    }
+}
+
+/// Patches of a chart, and grey paper, both with noise: no structure that the method may take for cloth.
+#[test]
+fn charts_and_paper_are_no_worse_than_interpolated() {
+    let mut state = 17u64;
+    let mut noise = || {
+        let mut one = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f32 / 16_777_216.0 - 0.5
+        };
+        0.012 * (one() + one() + one())
+    };
+    let patch = |k: usize| {
+        let column = k % 300 / 50;
+        let hue = (k / 300 / 50 * 6 + column) as f64;
+        [0.0, 2.1, 4.2].map(|shift| 0.42 + 0.36 * (1.7 * hue + shift).sin())
+    };
+    for (name, colour) in [("chart", &patch as &dyn Fn(usize) -> [f64; 3]), ("grey", &|_| [0.5; 3])]
+    {
+        let mut cloth = Cloth::linen([300, 300]);
+        cloth.normal.data.fill([0.0, 0.0, 1.0]);
+        for k in 0..300 * 300 {
+            let truth = colour(k).map(|c| c as f32);
+            cloth.truth.data[k] = truth;
+            let channel = cloth.cfa.channel(k % 300, k / 300) as usize;
+            cloth.mosaic.data[k] = truth[channel] * (1.0 + noise());
+        }
+        let found = cloth.found();
+        assert!(found.shade.data.iter().all(|shade| *shade > 0.999), "{name}: ink taken for shade");
+        let [all, hue] = cloth.errors(&found);
+        let [all_before, hue_before] = cloth.errors(&cloth.interpolated());
+        println!("{name}: {all} {hue}, interpolated {all_before} {hue_before}");
+        // Residual interpolation keeps a photosite's own noise in all three channels: less of it turns into colour, which an
+        // eye sees, and a little more stays in lightness.
+        assert!(hue < hue_before && all < 1.08 * all_before, "{name}: {all} {hue}");
     }
 }
 

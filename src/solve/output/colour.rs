@@ -138,8 +138,9 @@ fn level_warning(figures: &Figures, kind: AlbedoKind) -> Vec<String> {
 /// Yarns nearer to each other than this are near the Nyquist frequency of the mosaic, whose red and blue photosites lie two
 /// apart: a period of four.
 const FINE_YARNS_PX: f64 = 4.5;
-/// Mean CIEDE2000 of weaves of one dye by the distance of their yarns, photosites: simulated, lens blur of 0.7 px.
-const EXPECTED_ERROR: [[f64; 2]; 4] = [[2.0, 3.5], [2.6, 2.9], [4.0, 1.8], [7.0, 0.7]];
+/// Mean CIEDE2000 of plain weaves of one dye by the distance of their yarns, photosites: `bench --colors`, lens blur of
+/// 0.7 px. Most of it is lightness.
+const EXPECTED_ERROR: [[f64; 2]; 3] = [[2.0, 5.9], [2.6, 5.1], [5.3, 1.4]];
 
 /// What to do where yarns are too fine for their colours.
 fn capture_advice(yarns_px: f64) -> Option<String> {
@@ -320,8 +321,8 @@ mod tests {
     fn fine_yarns_are_advised_against() {
         let said = capture_advice(2.3).unwrap();
         assert!(said.starts_with("Yarns of 2.3 px are near the limit"), "{said}");
-        assert!(said.ends_with("about 3.2 CIEDE2000."), "{said}");
-        assert!(capture_advice(1.9).unwrap().ends_with("about 3.5 CIEDE2000."));
+        assert!(said.ends_with("about 5.5 CIEDE2000."), "{said}");
+        assert!(capture_advice(1.9).unwrap().ends_with("about 5.9 CIEDE2000."));
         assert_eq!((capture_advice(4.6), capture_advice(40.0)), (None, None));
     }
 }
