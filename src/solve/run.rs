@@ -276,6 +276,18 @@ fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), Solv
     Ok(())
 }
 
+/// What to say where this albedo takes the place of one of another meaning: a solution from before shade was divided out.
+fn albedo_changes(out: &Path, report: &Report) -> Option<String> {
+    let earlier = Report::read(&out.join(REPORT_JSON)).ok()?;
+    let appeared = earlier.albedo.is_none() && out.join(ALBEDO_EXR).is_file();
+    let reflects = report.albedo.as_ref().is_some_and(|albedo| albedo.kind == "reflectance");
+    (appeared && reflects).then(|| {
+        "The albedo differs from that of the earlier solution here: the shading of unresolved relief was in it; now it is \
+         divided out, and lies in shade.exr."
+            .to_owned()
+    })
+}
+
 fn report(options: &Options, rest: &Rest, maps: &Finished, counts: Counts) -> Report {
     let undistorted = options.grid == Grid::Undistorted;
     let camera = rest

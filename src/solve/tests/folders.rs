@@ -190,7 +190,7 @@ fn that_the_albedo_changes_its_meaning_is_told_once() {
     let folders = Folders::of(&scene(recipe));
     let options = Options { reuse: Reuse::Never, ..folders.options() };
     let told = || {
-        let report = run(&options, &|_| {}).unwrap().report;
+        let report = run(&options, &|_| {}, None).unwrap().report;
         report.warnings.iter().any(|said| said.contains("differs from that of the earlier"))
     };
     assert!(!told(), "there was none");
