@@ -38,7 +38,7 @@ pub(crate) fn act(command: Command, tools: &mut Tools, out: &Outbox) {
         }
         Command::SolveScan(scan, settings) => solve_scan(&scan, settings, tools, out),
         Command::Solve(sources, solution, settings) => {
-            solve(&sources, &solution, settings, tools, out)
+            solve(&sources, &solution, settings, tools, out);
         }
     }
 }
