@@ -381,7 +381,7 @@ mod tests {
         );
         check(
             "schema = 1\n[material]\npreset = \"velvet\"\nwear = 0.4\n",
-            ":3: `material.wear` is no use; this cloth has no yarns",
+            ":4: `material.wear` is no use; this cloth has no yarns",
         );
         check("schema = 2\n", "schema 2");
         check("schema = 1\n[table]\nlies = \"cat\"\n", "swatch, board, grey or white");

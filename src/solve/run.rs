@@ -89,7 +89,7 @@ fn run_on_this_pool(
     if options.grid == Grid::Undistorted && calibration.camera.is_none() {
         return Err(SolveError::NothingToUndistort { calibration: calibration.folder });
     }
-    check_reference(options, &calibration)?;
+    check_reference(options, calibration.color.camera_to_linear_srgb.is_some())?;
     let before = match options.reuse {
         Reuse::IfCurrent => still_current(options, &inputs.key(options), &session, page.is_some()),
         Reuse::Never => None,
@@ -277,7 +277,7 @@ fn copy_camera(rest: &Rest, options: &Options, folder: &Path) -> Result<(), Solv
 }
 
 /// What to say where this albedo takes the place of one of another meaning: a solution from before shade was divided out.
-fn albedo_changes(out: &Path, report: &Report) -> Option<String> {
+pub(super) fn albedo_changes(out: &Path, report: &Report) -> Option<String> {
     let earlier = Report::read(&out.join(REPORT_JSON)).ok()?;
     let appeared = earlier.albedo.is_none() && out.join(ALBEDO_EXR).is_file();
     let reflects = report.albedo.as_ref().is_some_and(|albedo| albedo.kind == "reflectance");

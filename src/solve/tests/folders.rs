@@ -12,6 +12,8 @@ use crate::session::{FrameEntry, Kind, Session};
 use crate::solution;
 use crate::solution::{AlbedoKind, Grid, NormalY, Outputs, Residuals, Reuse};
 use crate::solve::output::finish::finish;
+use crate::solve::output::finish::finish;
+use crate::solve::run::albedo_changes;
 use crate::solve::*;
 use crate::swatch::MaskChoice;
 use std::collections::BTreeMap;
@@ -188,19 +190,23 @@ fn that_the_albedo_changes_its_meaning_is_told_once() {
     let recipe =
         Recipe { width: 160, height: 150, layout: Layout::Mosaic(cfa), ..Recipe::default() };
     let folders = Folders::of(&scene(recipe));
-    let options = Options { reuse: Reuse::Never, ..folders.options() };
-    let told = || {
-        let report = run(&options, &|_| {}, None).unwrap().report;
-        report.warnings.iter().any(|said| said.contains("differs from that of the earlier"))
-    };
-    assert!(!told(), "there was none");
-    let path = options.out.join("report.json");
-    let mut report = solution::Report::read(&path).unwrap();
-    report.albedo = None;
-    report.write(&path).unwrap();
-    std::fs::remove_file(options.out.join("shade.exr")).unwrap();
-    assert!(told(), "the first time");
-    assert!(!told(), "the second time");
+    let report = run(&folders.options(), &|_| {}, None).unwrap().report;
+    assert_eq!(report.albedo.as_ref().unwrap().kind, "reflectance");
+    assert!(
+        report.warnings.iter().all(|said| !said.contains("earlier solution")),
+        "none was there"
+    );
+    let earlier = tempfile::tempdir().unwrap();
+    assert_eq!(albedo_changes(earlier.path(), &report), None, "nothing is there");
+    let silent = solution::Report { albedo: None, ..report.clone() };
+    silent.write(&earlier.path().join("report.json")).unwrap();
+    assert_eq!(albedo_changes(earlier.path(), &report), None, "it has no albedo");
+    std::fs::write(earlier.path().join("albedo.exr"), "").unwrap();
+    let said = albedo_changes(earlier.path(), &report).unwrap();
+    assert!(said.contains("differs from that of the earlier solution"), "{said}");
+    assert_eq!(albedo_changes(earlier.path(), &silent), None, "nothing changes");
+    report.write(&earlier.path().join("report.json")).unwrap();
+    assert_eq!(albedo_changes(earlier.path(), &report), None, "the second time");
 }
 
 /// Names of files that are not the same in both.
