@@ -12,7 +12,6 @@ use crate::session::{FrameEntry, Kind, Session};
 use crate::solution;
 use crate::solution::{AlbedoKind, Grid, NormalY, Outputs, Residuals, Reuse};
 use crate::solve::output::finish::finish;
-use crate::solve::output::finish::finish;
 use crate::solve::run::albedo_changes;
 use crate::solve::*;
 use crate::swatch::MaskChoice;
