@@ -9,6 +9,7 @@
 # make attacks mutated files, kills and errors at system calls, two processes on every output, by the thousand
 # make scan-timing   wall time of a scan of full-size frames beside exposure and transfer
 # make tether-timing the same through libgphoto2, with a camera that speaks PTP/IP
+# make measurements   docs/measurements.md: every figure that README and docs state; QUICK=1 for a check, LONG=1 for all
 # make bench   run time against error and against touching the bytes once; the window's frames
 SHELL := /bin/bash
 .DEFAULT_GOAL := build
@@ -28,7 +29,7 @@ FIRMWARE_PACKAGES := make gcc-avr avr-libc binutils-avr arduino-core-avr libsima
 # Kills and errors at chosen system calls.
 ATTACK_PACKAGES := strace
 
-.PHONY: demo test thorough build install bench soak kills attacks scan-timing tether-timing firmware packages-demo packages-all packages-firmware
+.PHONY: demo test thorough build install measurements bench soak kills attacks scan-timing tether-timing firmware packages-demo packages-all packages-firmware
 
 packages-demo:
 	@bash .ci/packages $(LINKER_PACKAGES)
@@ -77,6 +78,9 @@ install: build
 	install -D -t $(PREFIX)/bin target/release/weavelight target/release/weavelight-app target/release/weavelight-tether
 	install -D -m 644 -t $(PREFIX)/share/applications app/desktop/weavelight.desktop
 	install -D -m 644 -t $(PREFIX)/share/icons/hicolor/64x64/apps app/desktop/weavelight.png
+
+measurements: packages-all firmware
+	.ci/measure
 
 bench: packages-all
 	cargo bench --locked --all-features

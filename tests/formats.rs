@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 use weavelight::instrument::{Calibration, Rig, RigLightPlace};
 use weavelight::session::{Kind, Session, Target};
+use weavelight::simulate::Scene;
 use weavelight::solution::Report;
 
 /// The fenced blocks that name a file, by name.
@@ -44,6 +45,13 @@ fn a_rig() {
     assert_eq!(rig.lights.len(), 3);
     assert_eq!(rig.channel(2), 2);
     assert!(matches!(rig.lights[2].place, RigLightPlace::Directional { .. }));
+}
+
+#[test]
+fn a_scene() {
+    let home = written();
+    let scene = Scene::beside(&home.path().join("rig.toml")).unwrap();
+    assert_eq!((scene.places.len(), scene.flaws.psf_px, scene.material.wear), (3, 0.7, Some(0.2)));
 }
 
 #[test]

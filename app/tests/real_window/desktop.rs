@@ -1,5 +1,9 @@
 //! A display without a screen, and what is needed on it.
 
+#[allow(dead_code, unreachable_pub, clippy::print_stdout, reason = "test programs share it")]
+#[path = "../../../tests/support/skip.rs"]
+mod skip;
+
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -18,8 +22,14 @@ pub(crate) struct Desktop {
 }
 
 impl Desktop {
-    /// `None` where the tools are missing.
+    /// `None` where the tools are missing and their tests are to be skipped.
     pub(crate) fn start() -> Option<Self> {
+        let missing =
+            || "Xvfb, xdotool or ImageMagick is missing; `make test` installs them".to_owned();
+        skip::need("window", Self::try_start().ok_or_else(missing))
+    }
+
+    fn try_start() -> Option<Self> {
         for tool in ["xdotool", "import"] {
             Command::new(tool)
                 .arg("--version")

