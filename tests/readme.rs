@@ -51,3 +51,36 @@ fn its_pictures_are_there() {
         );
     }
 }
+
+/// Help texts of every command and of the commands below it, in one.
+fn all_help() -> String {
+    let help = |command: &[&str]| {
+        let mut program = Command::cargo_bin("weavelight").unwrap();
+        let output = program.args(command).arg("--help").output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let below = ["camera", "color", "lights", "check", "status"];
+    let mut all: String = commands().iter().map(|command| help(&[command.as_str()])).collect();
+    below.iter().for_each(|part| all.push_str(&help(&["calibrate", part])));
+    all
+}
+
+/// Options in a text, on lines that are not about other programs.
+fn options(text: &str) -> BTreeSet<String> {
+    let others = ["cargo ", "make ", "SEEDS=", "apt ", "ulimit", "--features"];
+    let lines = text.lines().filter(|line| !others.iter().any(|other| line.contains(other)));
+    let words = lines.flat_map(|line| line.split(|c: char| !c.is_ascii_alphanumeric() && c != '-'));
+    let options = words.filter(|word| word.starts_with("--") && word.len() > 3);
+    options.filter(|word| word.as_bytes()[2].is_ascii_lowercase()).map(str::to_owned).collect()
+}
+
+#[test]
+fn every_option_that_the_documents_name_is_there() {
+    let help = options(&all_help());
+    for name in ["README.md", "docs/scanning.md", "docs/calibration.md", "docs/formats.md"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        let named = options(&std::fs::read_to_string(path).unwrap());
+        let unknown: Vec<&String> = named.difference(&help).collect();
+        assert!(unknown.is_empty(), "{name}: {unknown:?}");
+    }
+}
