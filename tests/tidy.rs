@@ -148,7 +148,7 @@ const ROOMS: &[(&str, &[&str])] = &[
             "swatch",
         ],
     ),
-    ("settings", &["files", "gpu", "photometry", "solution", "solve"]),
+    ("settings", &["files", "gpu", "machine", "photometry", "solution", "solve"]),
     ("live", &["instrument", "linear", "photometry", "raw", "solution", "solve"]),
     ("compare", &["files", "raster"]),
     ("calibrate", &["files", "instrument", "linear", "raw", "session"]),
