@@ -56,26 +56,31 @@ fn help_of(command: &str) -> String {
 /// Digits that do not depend on the processor's instruction set.
 const DIGITS: i32 = 3;
 
-/// A report without what differs from run to run: seconds, hashes of keys, folders; numbers to three digits.
+/// What is smaller is rounding.
+const LEAST: f64 = 1e-4;
+
+/// A report without what differs from run to run: seconds, hashes, folders; numbers to three digits.
 fn without_chance(value: &mut Value, key: &str) {
     match value {
-        Value::Object(map) => map.iter_mut().for_each(|(key, value)| without_chance(value, key)),
+        Value::Object(map) => {
+            for (name, value) in map {
+                without_chance(value, if key == "seconds" { key } else { name });
+            }
+        }
         Value::Array(list) => list.iter_mut().for_each(|value| without_chance(value, key)),
         Value::String(text) if key == "key" || key == "sha256" => *text = "[hash]".to_owned(),
         Value::String(text) if text.starts_with('/') => *text = "[path]".to_owned(),
+        Value::Number(_) if key == "seconds" => *value = "[seconds]".into(),
         Value::Number(number) if number.is_f64() => {
             let rounded = round(number.as_f64().unwrap());
             *value = serde_json::json!(rounded);
         }
         _ => {}
     }
-    if ["read", "solve", "colour", "write", "page", "seconds"].contains(&key) && value.is_number() {
-        *value = Value::String("[seconds]".to_owned());
-    }
 }
 
 fn round(number: f64) -> f64 {
-    if number == 0.0 {
+    if number.abs() < LEAST {
         return 0.0;
     }
     let places = (DIGITS - 1 - number.abs().log10().floor() as i32).max(0) as usize;
