@@ -141,7 +141,7 @@ fn the_wizard_goes_to_a_finished_calibration() {
     let name = kept.file_name().into_string().unwrap();
     assert!(name.starts_with("pictures-lights-"), "{name}");
     assert!(kept.path().join("white-flat/session.toml").exists());
-    let said = format!("under history/{name}; History takes it back");
+    let said = format!("under history/{name}; restore them under History");
     assert!(window.harness.query_by_label_contains(&said).is_some());
     window.harness.get_by_label_contains("Put back, Lights").click();
     window.harness.step();
