@@ -20,7 +20,6 @@ fn measure(cloth: &str, psf_px: f64) -> ColorRow {
 fn check(cloth: &str, [mean, p95, blocks, false_color]: [f64; 4]) {
     let row = measure(cloth, 0.0);
     let found = &row.figures;
-    println!("{cloth}: {found:?}");
     assert!(found.mean_de2000 <= mean, "{cloth}: {found:?}");
     assert!(found.p95_de2000 <= p95, "{cloth}: {found:?}");
     assert!(found.mean_de2000_4x4.unwrap() <= blocks, "{cloth}: {found:?}");

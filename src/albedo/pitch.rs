@@ -167,7 +167,7 @@ mod tests {
         (0..300 * 280).filter(|k| k % 50 == 0).for_each(|k| thin.data[k] = 0);
         assert!(yarn_pitch(&woven, &mask).is_some());
         let found = yarn_pitch(&woven, &thin);
-        assert!(found.is_none_or(|pitch| (pitch - 3.14).abs() < 0.1), "{found:?}");
+        assert!(found.is_none_or(|pitch| (pitch - std::f64::consts::PI).abs() < 0.1), "{found:?}");
         let empty = Image { width: 300, height: 280, data: vec![0; 300 * 280] };
         assert_eq!(yarn_pitch(&woven, &empty), None);
         let small = Image { width: 40, height: 30, data: vec![255; 1200] };

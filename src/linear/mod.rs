@@ -1,7 +1,7 @@
 //! From raw numbers to linear light, and the noise of that light: the only room that converts.
 //!
-//! Linear light is a fraction of full scale: 0 at the black level, 1 at the end of the range. [`Levels`] say how raw numbers
-//! map to it, [`Reading`] applies them to a frame, [`Normalizer`] turns the frames of all lights into the signals that the
+//! Linear light is a fraction of full scale: 0 at the black level, 1 at the end of the range. `Levels` say how raw numbers
+//! map to it, `Reading` applies them to a frame, `Normalizer` turns the frames of all lights into the signals that the
 //! kernels fit.
 
 mod estimate;

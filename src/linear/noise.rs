@@ -150,7 +150,7 @@ fn grey_variance(channels: [VarianceModel; 3]) -> VarianceModel {
 /// Full scale of the sensor in raw numbers: the mean over the 2 x 2 cell, and the largest of all frames.
 pub(crate) fn full_scale(of: &Photographs) -> f64 {
     let of_frame = |exposure: &Exposure| {
-        let range = Reading::new(&exposure.frame, &of.color).range();
+        let range = Reading::new(&exposure.frame, of.color).range();
         range.iter().map(|&range| f64::from(range)).sum::<f64>() / 4.0
     };
     let lit = of.lights.iter().flat_map(|light| &light.exposures);

@@ -306,7 +306,7 @@ mod tests {
     #[test]
     fn holes_in_the_normals_spread_nowhere() {
         let (clean, mut holed) = (cloth(220, 200), cloth(220, 200));
-        let hole = |k: usize| k % 997 == 0;
+        let hole = |k: usize| k.is_multiple_of(997);
         (0..220 * 200).filter(|k| hole(*k)).for_each(|k| holed.normal.data[k] = [f32::NAN; 3]);
         let (a, b) = (clean.coloured(&Color::default()), holed.coloured(&Color::default()));
         assert_eq!(b.report.kind, "reflectance");
