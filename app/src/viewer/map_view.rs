@@ -1,6 +1,6 @@
 //! Maps to look at: panned and zoomed to single photosites, under any light. A widget that any room can show.
 //!
-//! [`MapView::show`] draws [`Maps`] as an [`Appearance`] says. Pictures lie in main memory as pyramids of half-precision texels;
+//! [`MapView::show`] draws [`Maps`] as an `Appearance` says. Pictures lie in main memory as pyramids of half-precision texels;
 //! of these only the tiles that are seen go to the graphics card, a few a frame.
 
 use crate::texts::look as texts;

@@ -1,12 +1,12 @@
 //! The Look room: a solution's maps under any light.
 //!
-//! - [`view`]: the widget that draws maps; other rooms embed it
+//! - `viewer`: the widget that draws maps; other rooms embed it
 //! - `opened`: a solution off the disk; `capture`: the frames that it was solved from; `work`: the worker's part
 //! - `layer`: what can be shown; `lamp`: under which light
 //! - `canvas`: the maps with what is drawn over them, and the mouse; `legend`: scales
 //! - `follow`: which solution is looked at; `drafts`: strokes of a mask that were not saved yet
 //! - `side`: the panel beside them; `loupe`: the numbers of a photosite; `plots`: histogram and profile
-//! - [`slopes`], [`profile`], [`mask`]: the sums behind
+//! - `viewer::slopes`, [`profile`], `viewer::mask`: the sums behind
 
 mod canvas;
 mod edits;
