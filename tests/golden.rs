@@ -1,5 +1,5 @@
 //! What scripts and people rely on, as stored text: `--help` of every command, `--json` of those that a small capture session
-//! goes through, and `report.json`. After an intended change `SNAPSHOTS=overwrite cargo test --test golden` stores it anew; read the diff.
+//! goes through, and `report.json`. After an intended change `SNAPSHOTS=overwrite cargo test --test golden` stores the new one; read the diff.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set its scene up has failed")]
 
@@ -45,7 +45,7 @@ fn help_texts() {
     }
 }
 
-/// The text, after it was held against what is stored.
+/// The text, after comparing it with the stored one.
 fn help_of(command: &str) -> String {
     let name = format!("help/weavelight {command}").trim_end().replace(' ', "-") + ".txt";
     let text = help(command);

@@ -55,7 +55,7 @@ pub struct ColorRow {
     pub level_sigma: Option<f64>,
 }
 
-/// Largest figures over several crops, each by itself.
+/// The largest of each figure over several crops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Worst {
     /// Mean CIEDE2000.
@@ -68,7 +68,7 @@ pub struct Worst {
     pub false_color: f64,
 }
 
-/// Photographs, solves and compares; `progress` is told the share done (0 to 1) and what is being done.
+/// Photographs, solves and compares; `progress` gets the share done (0 to 1) and what is being done.
 ///
 /// # Errors
 /// Where a cloth cannot be simulated or solved.

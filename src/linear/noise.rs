@@ -85,7 +85,7 @@ fn exposure_variance(
     }
 }
 
-/// Variance of a weighted mean of independent exposures. What the light model leaves over (kappa) is the same in all.
+/// Variance of a weighted mean of independent exposures. The error of the light model (kappa) is the same in all.
 fn merged_variance(parts: &[(f64, VarianceModel)]) -> VarianceModel {
     let total: f64 = parts.iter().map(|(weight, _)| weight).sum();
     let mean = |part: fn(&VarianceModel) -> f32| {

@@ -44,7 +44,7 @@ pub struct Summary {
     pub swatch_exposure_s: Option<f64>,
 }
 
-/// Writes a simulated rig's folders. `progress` is told the share done (0..1) and what is being made, possibly from several
+/// Writes a simulated rig's folders. `progress` gets the share done (0..1) and what is being made, possibly from several
 /// threads. The folder appears under its name only when whole; an earlier simulation of that name is replaced.
 ///
 /// # Errors

@@ -366,7 +366,7 @@ impl Options {
 
 const NO_YARNS: &str = "this cloth has no yarns; choose a woven or knitted one";
 
-/// Dyes a yarn anew; where only its colour is given, it stays as worn as it was.
+/// Changes the dye of a yarn; where only its colour is given, its wear stays.
 fn dye(yarn: &mut Yarn, color: Option<[f64; 3]>, wear: Option<f64>) {
     if let Some(color) = color {
         let kept: [f32; 3] = std::array::from_fn(|c| yarn.color_low[c] / yarn.color[c].max(1e-6));

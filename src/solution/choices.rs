@@ -77,7 +77,7 @@ pub enum NormalY {
     Down,
 }
 
-/// What becomes of what the fit leaves over.
+/// Whether the fit's residual of each light is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Residuals {
     /// It is not even computed.
